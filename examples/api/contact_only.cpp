@@ -3,7 +3,7 @@
 // energy, gradient, Hessian (blocks, here into a sparse matrix) and the part of a step that is free of collisions.
 #include <Eigen/SparseCholesky>
 #include <cstdio>
-#include "energy/contact/contact.hpp"
+#include <itr/contact.hpp>
 
 namespace {
 

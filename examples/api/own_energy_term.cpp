@@ -3,7 +3,6 @@
 // boundary facets. The remesher sees it as it sees the library's terms: it is asked for patches too.
 #include <cstdio>
 #include <itr/itr.hpp>
-#include "fem/cell_set.hpp"
 
 namespace {
 

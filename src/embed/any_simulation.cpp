@@ -154,7 +154,7 @@ struct AnySimulation::Impl {
     std::map<std::string, std::vector<int>> obstacle_vertices;
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
-    const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
+    const Mesh<Dim>& mesh() const { return simulation.mesh(); }
     /// Also what a simulation that `remeshes` may curve later, be its mesh frozen now or not.
     void refuse_curved(const std::string& place, bool remeshes) const {
       if (mesh().has_nodes()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
@@ -293,10 +293,10 @@ double AnySimulation::step_length() const {
   return impl_->visit([](const auto& d) { return d.simulation.setup().time.dt; });
 }
 double AnySimulation::time() const {
-  return impl_->visit([](const auto& d) { return d.simulation.state().t; });
+  return impl_->visit([](const auto& d) { return d.simulation.time(); });
 }
 int AnySimulation::steps() const {
-  return impl_->visit([](const auto& d) { return d.simulation.state().step; });
+  return impl_->visit([](const auto& d) { return d.simulation.steps(); });
 }
 bool AnySimulation::finished() const {
   return impl_->visit([](const auto& d) { return d.simulation.finished(); });

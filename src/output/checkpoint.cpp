@@ -8,6 +8,7 @@
 #include "frame_file.hpp"
 #include "itr/core.hpp"
 #include "report_json.hpp"
+#include "simulation/state.hpp"
 
 namespace itr::output {
 

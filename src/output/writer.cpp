@@ -15,6 +15,7 @@
 #include "frame_file.hpp"
 #include "itr/core.hpp"
 #include "report_json.hpp"
+#include "simulation/state.hpp"
 #include "time_series.hpp"
 #include "units.hpp"
 #include "vtu_file.hpp"
@@ -185,8 +186,8 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info)
 
 template <int Dim>
 Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
-    : impl_(
-          std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state->step, checkpoint.log_bytes)) {
+    : impl_(std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state->step,
+                                   checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
   impl_->seconds_before = impl_->totals.report().seconds.total;
   const State<Dim>& state = *checkpoint.state;

@@ -269,7 +269,7 @@ class Run {
                    saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
     is_saved_ = saved.has_value();
     if (saved)
-      spdlog::info("going on after step {}", simulation_.state().step);
+      spdlog::info("going on after step {}", simulation_.steps());
     else
       write(simulation_.report());
   }
@@ -287,13 +287,13 @@ class Run {
       writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
       const std::string of_output =
-          fmt::format("step {}, whose files could not all be written: {}", simulation_.state().step, error.what());
+          fmt::format("step {}, whose files could not all be written: {}", simulation_.steps(), error.what());
       outcome = outcome.empty() || outcome == kFinished ? "stopped at " + of_output : outcome + "; and at " + of_output;
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     const bool is_finished = outcome == kFinished;
     if (is_finished)
-      fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
+      fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
     if (is_finished) tell_remeshing();
     count_warnings();
     if (with_report_) write_report();
@@ -398,21 +398,21 @@ class Run {
         }
       }();
       if (!result.ok && stop_now)
-        return fmt::format("interrupted in step {}, which is dropped", simulation_.state().step + 1);
+        return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
             "--allow-changes and --set /time/step_cuts=8 (smaller steps where one fails), more "
             "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
             directory_);
-        return fmt::format("stopped in step {} (t = {}): {}", simulation_.state().step + 1,
-                           units.text(simulation_.state().t + simulation_.setup().time.dt, "s", 6), result.reason);
+        return fmt::format("stopped in step {} (t = {}): {}", simulation_.steps() + 1,
+                           units.text(simulation_.time() + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
       if (profile_) profile_->add(result.report.step);
       ++steps_done_;
       show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
-      if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
+      if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.steps());
     }
     return kFinished;
   }
@@ -432,7 +432,7 @@ class Run {
     const ScopedTimer timer(output_seconds_);
     const auto phase = ScopedPhase::coarse("output");
     const State<Dim>& state = simulation_.state();
-    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(state.step);
+    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps());
     simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
   }
 
