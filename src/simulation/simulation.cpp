@@ -529,7 +529,7 @@ void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
   FrameView<Dim> frame{snapshot.state->mesh,  data.x, data.v, data.elastic_density, data.obstacle_x,
                        setup.obstacles.edges, setup.obstacles.triangles, &data.asked};
   frame.names = &setup.names;
-  frame.dhat = setup.contact.activation_distance;
+  frame.dhat = setup.contact.dhat;
   if (setup.proxy) frame.proxy = {&data.proxy_x, &setup.proxy->edges, &setup.proxy->triangles};
   observer(frame);
 }
