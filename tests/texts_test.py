@@ -6,7 +6,8 @@ usage: [PYTHONPATH=BUILD_DIR/python] texts_test.py ITR SOURCE_DIR [--write]
 
 A case of texts.txt begins with "== name". Its lines "@ base changes" merge changes (JSON) into a scene of BASES and write
 scene.json; its lines "$ arguments" run the command in a folder with FILES; "| warnings" keeps the text from the line
-"warnings" on. A case "== api: name" is the message of an error of bad_input.py. `--write` makes all texts anew.
+"warnings" on. Without such a line it is `run scene.json`, and a run that was refused (no summary, exit 2) does not say so. A
+case "== api: name" is the message of an error of bad_input.py. `--write` makes all texts anew.
 
 Masks: the source folder is SOURCE, the folder of the case FOLDER. Numbers that a run computes are #, so all numbers that a run
 prints which was not refused are. Lines that are then equal to the line before are left out.
@@ -101,6 +102,8 @@ def produce(itr, line, folder, source):
     if command[0] == "run" and (folder / "out/summary.json").exists():
         summary = json.loads((folder / "out/summary.json").read_text())
         lines.append(f"summary: solver {summary['solver']}, warnings {[w['count'] for w in summary['warnings']]}")
+    elif command[0] == "run" and shown.returncode == 2:
+        return lines
     elif command[0] == "run":
         lines.append("no summary")
     return [*lines, f"exit {shown.returncode}"]
@@ -119,8 +122,10 @@ def make_case(itr, given, source):
             if line.startswith("@ "):
                 base, _, changes = line[2:].partition(" ")
                 (folder / "scene.json").write_text(json.dumps(merge(BASES[base], json.loads(changes))))
-            elif line.startswith("$ "):
+            else:
                 made += produce(itr, line[2:], folder, source)
+        if not any(line.startswith("$ ") for line in given):
+            made += produce(itr, "run scene.json", folder, source)
     return made
 
 

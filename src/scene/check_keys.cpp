@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "check_keys.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "key_table.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 
@@ -60,7 +59,7 @@ class Checker {
     if (entry && entry->key->role != Role::read) return check_unread(node, *entry);
     const std::set<std::string>* children = key_table().children(pattern);
     if (children && children->contains("*")) return check_items(node, pattern);
-    if (entry && (!children || (*entry->key->kind && !node.json().is_object()))) return check_value(node, *entry);
+    if (entry && (!children || (!entry->key->kind.empty() && !node.json().is_object()))) return check_value(node, *entry);
     if (!node.json().is_object()) node.fail("an object");
     for (const auto& [key, value] : node.json().items()) {
       if (!children->contains(key)) refuse_unknown(node, key, key_table().names_below(pattern));
@@ -86,7 +85,7 @@ class Checker {
       case Role::only:
         if (node.json() != entry.fallback)
           node.fail(fmt::format("{}: others are not supported{}", abbreviate(entry.fallback),
-                                *entry.key->meaning ? fmt::format(" ({})", entry.key->meaning) : ""));
+                                entry.key->meaning.empty() ? "" : fmt::format(" ({})", entry.key->meaning)));
         return;
       case Role::removed:
         node.fail("a key that was removed in version 0.2", entry.key->meaning);

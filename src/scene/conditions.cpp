@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "conditions.hpp"
-
 #include <algorithm>
 #include <set>
 
 #include "function.hpp"
-#include "selection.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "merge.hpp"
-
 #include <algorithm>
 
 #include "core/read_file.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

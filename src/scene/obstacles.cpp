@@ -8,7 +8,7 @@
 
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
-#include "selection.hpp"
+#include "transformation.hpp"
 
 namespace itr::scene {
 
@@ -262,11 +262,10 @@ Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles&
   return {std::move(points), std::move(surface.edges), std::move(surface.triangles), {}, {}};
 }
 
-template Obstacles<2> read_surface(const Node&, const Node&, MeshFiles&);
-template Obstacles<3> read_surface(const Node&, const Node&, MeshFiles&);
-template ObstacleGeometry<2> read_obstacles(const Geometries&, MeshFiles&, const Mesh<2>&, const Sets&,
-                                            std::vector<std::string>&);
-template ObstacleGeometry<3> read_obstacles(const Geometries&, MeshFiles&, const Mesh<3>&, const Sets&,
-                                            std::vector<std::string>&);
+#define ITR_INSTANTIATE(Dim)                                                                                  \
+  template Obstacles<Dim> read_surface(const Node&, const Node&, MeshFiles&);                                 \
+  template ObstacleGeometry<Dim> read_obstacles(const Geometries&, MeshFiles&, const Mesh<Dim>&, const Sets&, \
+                                                std::vector<std::string>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

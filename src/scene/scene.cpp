@@ -5,16 +5,10 @@
 #include <limits>
 #include <set>
 
-#include "check_keys.hpp"
-#include "collision_mesh.hpp"
-#include "conditions.hpp"
 #include "defaults.hpp"
-#include "forces.hpp"
 #include "geometry.hpp"
-#include "materials.hpp"
-#include "merge.hpp"
 #include "mesh/rest_box.hpp"
-#include "options.hpp"
+#include "readers.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {

@@ -8,22 +8,108 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "itr/core.hpp"
+#include "itr/setup.hpp"
 #include "mesh/connected_parts.hpp"
-#include "simulation/held_corners.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
+#include "simulation/step_terms.hpp"
 #include "sizes.hpp"
 
 namespace itr {
 
 namespace {
+
+constexpr double kResolved = 1e-12;  ///< of the bodies' diagonal
+
+template <int Dim>
+using Conditions = std::vector<const DirichletCondition<Dim>*>;
+
+/// Conditions that hold each vertex, the winner last.
+template <int Dim>
+std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const ConditionsByTag<Dim> all = conditions_by_tag<Dim>(setup);
+  std::vector<Conditions<Dim>> holding(mesh.node_slots());
+  const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
+    std::erase(holding[v], condition);
+    holding[v].push_back(condition);
+  };
+  for (const auto& [tag, condition] : all)
+    for (const FacetId f : mesh.live_facets())
+      if (mesh.facet_tag(f) == tag)
+        for (const VertexId v : mesh.facet(f)) add(v, condition);
+  for (const auto& [tag, condition] : all)
+    for (const VertexId v : mesh.live_vertices())
+      if (mesh.vertex_tag(v) == tag) add(v, condition);
+  return holding;
+}
+
+/// Largest difference of the displacements that two conditions prescribe in a component that both hold, at the ends of the
+/// first, the middle and the last step. Less than `resolved` [m] is none.
+template <int Dim>
+double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim>& b, const RestPoint<Dim>& X,
+                  const TimeOptions& time, double resolved) {
+  constexpr double kRounding = 1e-9;
+  double largest = 0;
+  for (const int step : {1, (time.steps + 1) / 2, time.steps}) {
+    const double t = time.time_after(time.first_step + step);
+    const Vec<Dim> of_a = a.displacement(X, t), of_b = b.displacement(X, t);
+    for (int c = 0; c < Dim; ++c) {
+      if (!a.components[c] || !b.components[c]) continue;
+      const double by = std::abs(of_a[c] - of_b[c]);
+      if (by > std::max(resolved, kRounding * std::max(std::abs(of_a[c]), std::abs(of_b[c]))))
+        largest = std::max(largest, by);
+    }
+  }
+  return largest;
+}
+
+struct Contradiction {
+  int vertices = 0;
+  VertexId worst = kNone;
+  double by = 0;  ///< [m]
+};
+
+/// Adds a sentence for each two Dirichlet conditions that ask for different displacements of a vertex which both hold: that
+/// of the larger id counts, and that of points before that of surfaces (see HeldRule).
+template <int Dim>
+void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins
+  const std::vector<Conditions<Dim>> holding = by_vertex(setup);
+  const double resolved = kResolved * rest_diagonal(setup.mesh);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
+    for (std::size_t i = 0; i < holding[v].size(); ++i)
+      for (std::size_t j = i + 1; j < holding[v].size(); ++j) {
+        const auto &loser = *holding[v][i], &winner = *holding[v][j];
+        double by = 0;
+        try {
+          by = difference<Dim>(loser, winner, setup.mesh.point(v), setup.time, resolved);
+        } catch (const InputError&) {  // the step that asks for it says so
+          continue;
+        }
+        if (!(by > 0)) continue;
+        Contradiction& here = all[{loser.tag, winner.tag}];
+        ++here.vertices;
+        if (by > here.by) here = {here.vertices, v, by};
+      }
+  for (const auto& [ids, here] : all) {
+    const Vec<Dim> place = setup.mesh.rest(here.worst) / setup.units.factor("m");
+    found.push_back(fmt::format(
+        "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
+        "({:.4g}): that of {} counts there",
+        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), fmt::join(place, ", "), ids.second));
+  }
+}
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSliver = 0.1;                  ///< quality below which an element is one
@@ -58,8 +144,7 @@ struct MeshFigures {
       longest = std::max(longest, length);
     }
     Eigen::AlignedBox<double, Dim> box;
-    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-      if (!mesh.is_cell_alive(c)) continue;
+    for (const CellId c : mesh.live_cells()) {
       std::array<Vec<Dim>, Dim + 1> corners;
       for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
       const double quality = simplex_quality<Dim>(corners);
@@ -69,16 +154,15 @@ struct MeshFigures {
     size = box.sizes().maxCoeff();
     const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
+    for (const VertexId v : mesh.live_vertices())
+      if ((mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
   }
 };
 
 template <int Dim>
 std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
   std::map<int, double> volumes;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) volumes[mesh.body(c)] += mesh.volume(c);
+  for (const CellId c : mesh.live_cells()) volumes[mesh.body(c)] += mesh.volume(c);
   return volumes;
 }
 
@@ -93,7 +177,7 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
             : fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/unit is "
                           "\"mm\", for a whole scene /units/length)",
                           figures.size));
-  const bool has_mass = (!setup.time.is_static && !setup.time.quasistatic) || setup.body_acceleration;
+  const bool has_mass = setup.time.has_inertia() || setup.body_acceleration;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
@@ -169,8 +253,8 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
       if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || fixed.contains(part[mesh.cell(c)[0]])) continue;
+  for (const CellId c : mesh.live_cells()) {
+    if (fixed.contains(part[mesh.cell(c)[0]])) continue;
     loose.insert(part[mesh.cell(c)[0]]);
     bodies.insert(mesh.body(c));
   }
@@ -198,7 +282,7 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
 
 template <int Dim>
 void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found) {
-  if (!setup.time.is_static && !setup.time.quasistatic) return;
+  if (setup.time.has_inertia()) return;
   const auto [bodies, parts] = find_loose_parts(setup);
   if (parts == 0) return;
   std::string names;
@@ -265,7 +349,7 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
 /// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
 template <int Dim>
 void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
-  constexpr double kShare = 0.01;
+  constexpr double kFraction = 0.01;
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
   double stiffness = 0;
@@ -273,7 +357,7 @@ void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::st
     stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
   const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
   const double split = *setup.remesh.split.acceptance_tolerance;
-  if (worth > kShare * split)
+  if (worth > kFraction * split)
     found.push_back(fmt::format(
         "Newton ends at steps of {}, which are worth about {}; a split is made for {}{}: refinement "
         "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
@@ -286,7 +370,7 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.contact.enabled) return;
   const State<Dim>& state = simulation.state();
-  const double dhat = setup.contact.activation_distance;
+  const double dhat = setup.contact.dhat;
   Workspace workspace;
   const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const ContactEnergy<Dim> energy(contact.surface, setup.contact, 1, 1);
@@ -417,7 +501,7 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));
-  if (!setup.time.is_static && !setup.time.quasistatic) foretell_waves(setup, figures, words);
+  if (setup.time.has_inertia()) foretell_waves(setup, figures, words);
   return words;
 }
 

@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <set>
 #include <string>
 #include <utility>
 
+#include <memory>
 #include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
@@ -23,9 +22,7 @@ namespace {
 
 template <int Dim>
 std::string describe(const Vec<Dim>& p, const Units& units) {
-  std::string text;
-  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.6g}", c ? ", " : "(", units.from_si(p[c], "m"));
-  return text + ")";
+  return fmt::format("({:.6g})", fmt::join(Vec<Dim>(p / units.factor("m")), ", "));
 }
 
 /// Where no surfaces cross: what is wholly inside of a body.
@@ -41,8 +38,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   if (!has_closed_faces(state.mesh)) {
     for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
-             overlap.depth > setup.contact.activation_distance) {
+  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords); overlap.depth > setup.contact.dhat) {
     refuse("a body", overlap.place);
   }
   for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)
@@ -192,8 +188,44 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   template State<Dim> initial_state(const Setup<Dim>&);                     \
   template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
   template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
+
+template <int Dim>
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache) {
+  SparseSystem& system = cache.system;
+  StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, cache, state.stiffness, {}, state.chords);
+  VectorX force = problem.total_force(state.history.x[0], state.history.v[0]);
+  const DofMap& dofs = problem.dofs();
+  VectorX& a = state.history.a[0];
+  const VectorX zero = VectorX::Zero(a.size());
+  EnergySum sum;
+  const auto inertia = std::make_shared<InertiaEnergy<Dim>>(problem.cells(), setup.materials,
+                                                            setup.lump_mass ? MassKind::lumped : MassKind::consistent, zero);
+  sum.add(inertia);
+  VectorX held = a;
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) held[i] = 0;
+  VectorX of_held = zero;
+  inertia->add_mass_product(held, of_held);
+  Workspace workspace;
+  PrescribedMotion motion;
+  VectorX rhs(dofs.num_unknowns), solution(dofs.num_unknowns);
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = force[i] - of_held[i];
+  if (dofs.num_unknowns == 0) return;
+  system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
+  linear::Outcome outcome = rhs.allFinite() ? system.factorize(0).outcome : linear::Outcome::non_finite;
+  if (outcome == linear::Outcome::ok) outcome = system.solve_again(rhs, solution).outcome;
+  if (outcome != linear::Outcome::ok)
+    throw InputError({"", "/initial_conditions/acceleration",
+                      "\"consistent\", but M a = f cannot be solved at the start: " + std::string(to_string(outcome)) +
+                          ", " + (rhs.allFinite() ? system.message() : "a force is not finite"),
+                      "masses above 0 and a solver that copes with the mass matrix, or a given acceleration"});
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
+}
+
+template void set_consistent_acceleration<2>(const Setup<2>&, State<2>&, ProblemCache<2>&);
+template void set_consistent_acceleration<3>(const Setup<3>&, State<3>&, ProblemCache<3>&);
 
 }  // namespace itr

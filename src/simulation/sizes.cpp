@@ -38,14 +38,12 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
   std::map<int, BodySize> sizes;
   std::map<int, Eigen::AlignedBox<double, Dim>> boxes;
   std::map<int, int> cells;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     sizes[mesh.body(c)].volume += mesh.volume(c);
     ++cells[mesh.body(c)];
     for (const int v : mesh.cell(c)) boxes[mesh.body(c)].extend(mesh.rest(v));
   }
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) sizes[body_at<Dim>(mesh, mesh.facet(f))].surface += facet_measure(mesh, f);
+  for (const FacetId f : mesh.live_facets()) sizes[body_at<Dim>(mesh, mesh.facet(f))].surface += facet_measure(mesh, f);
   for (auto& [body, size] : sizes) {
     size.diagonal = boxes[body].diagonal().norm();
     size.thickness = size.surface > 0 ? 2 * size.volume / size.surface : size.diagonal;
