@@ -11,11 +11,10 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   set.num_vertices = static_cast<int>(set.rest.size());
   std::vector<typename CellSet<Dim>::Element> curved;
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c))
-      if (const auto element = element_of(mesh, c); element.curved)
-        curved.push_back(element);
-      else
-        set.elements.push_back(element);
+    if (mesh.is_cell_alive(c)) {
+      const auto element = element_of(mesh, c);
+      (element.curved ? curved : set.elements).push_back(element);
+    }
   set.elements.insert(set.elements.end(), curved.begin(), curved.end());
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
     if (!mesh.is_facet_alive(f)) continue;
