@@ -38,7 +38,7 @@ constexpr Key kKeys[] = {
     {"/geometry/*/type", read, "mesh|mesh_array|plane|ground|mesh_sequence", "\"mesh\"", "",
      "mesh_array makes copies; plane and ground are flat obstacles without end, which need no file; "
      "mesh_sequence is not supported yet"},
-    {"/geometry/*/name", read, "string", "", "", "an id of all its cells, or of the obstacle in /output/forces"},
+    {"/geometry/*/name", read, "string", "", "", "an id of all its cells, or of the obstacle"},
     {"/geometry/*/enabled", read, "boolean", "true", "", "false: as if the entry were not there, its file is not opened"},
     {"/geometry/*/is_obstacle", read, "boolean", "false", "",
      "only collides: it has no material and no unknowns, stands still or moves as prescribed", basic},

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "simulation/named.hpp"
+
 namespace itr {
 
 namespace {
@@ -52,13 +54,10 @@ std::string FlightGuard<Dim>::describe(const Units& units) const {
         "can "
         "carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
         kFarthest);
-  std::string place;
-  for (int c = 0; c < Dim; ++c)
-    place += fmt::format("{}{:.3g}", c ? ", " : "", units.from_si(start_[Dim * flown_->nodes.front() + c], "m"));
   return fmt::format(
-      "loads push a body that its conditions do not hold, the one at ({}), and nothing comes in its way: there is no "
+      "loads push a body that its conditions do not hold, the one at {}, and nothing comes in its way: there is no "
       "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
-      place);
+      point_text<Dim>(start_.segment<Dim>(Dim * flown_->nodes.front()), units, 3));
 }
 
 template class FlightGuard<2>;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "itr/core/error.hpp"
+#include "simulation/named.hpp"
 #include "simulation/step_terms.hpp"
 
 namespace itr {
@@ -89,13 +90,12 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
         if (by > here.by) here = {here.vertices, v, by};
       }
   for (const auto& [ids, here] : all) {
-    std::string place;
-    for (int c = 0; c < Dim; ++c)
-      place += fmt::format("{}{:.4g}", c ? ", " : "", setup.units.from_si(setup.mesh.rest(here.worst)[c], "m"));
+    const std::string winner = set_text(setup.names.surfaces, ids.second);
     found.push_back(fmt::format(
         "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
-        "({}): that of {} counts there",
-        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), place, ids.second));
+        "{}: that of {} counts there",
+        set_text(setup.names.surfaces, ids.first), winner, here.vertices, setup.units.text(here.by, "m", 3),
+        point_text<Dim>(setup.mesh.rest(here.worst), setup.units, 4), winner));
   }
 }
 
