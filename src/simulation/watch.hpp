@@ -15,9 +15,13 @@ class Watch {
   void find_rotation(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger);
   void find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger);
   void find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger);
+  void find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger);
 
   bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false;
-  int loose_steps_ = 0;  ///< in a row
+  int loose_steps_ = 0;      ///< in a row
+  double most_elastic_ = 0;  ///< energy of a step so far [J]
+  double gap_share_ = 0;     ///< in that step: gaps by the rest of the way that bodies are compressed
+  double gap_ = 0;           ///< in that step, the mean by force [m]
 };
 
 }  // namespace itr
