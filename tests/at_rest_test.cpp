@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "random_tets.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation_scenes.hpp"
@@ -233,6 +233,48 @@ TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {
   EXPECT_EQ(count(1e-7, 1, 1e6), 1u) << "a step moves the square by 5e-17 m";
   EXPECT_EQ(count(1e-3, 1, 1e13), 1u) << "a strain of 1e-13";
   EXPECT_EQ(count(1e-7, 0, 1e6), 0u) << "nothing acts";
+}
+
+TEST(Resolution, OfALongStepIsThatOfTheBodyAtRestWhereConditionsHoldIt) {
+  for (const bool is_held : {false, true}) {
+    auto setup = plain_square(1, 1e6);
+    setup.neumann.push_back({3, [](const Vec<2>&, double) { return Vec<2>(3e-7, 0); }});
+    if (is_held) hold(setup, 1);
+    setup.time.dt = 10;
+    linear::Registry registry;
+    std::vector<std::string> found;
+    find_unresolved(Simulation<2>(setup, registry), found);
+    EXPECT_EQ(found.size(), is_held ? 1u : 0u);
+  }
+}
+
+TEST(Resolution, WithoutInertiaIsNoMatterOfAVelocity) {
+  auto setup = plain_square(1, 1e6);
+  setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(1, 0); }});
+  setup.time.quasistatic = true;
+  linear::Registry registry;
+  std::vector<std::string> found;
+  find_unresolved(Simulation<2>(setup, registry), found);
+  EXPECT_TRUE(found.empty());
+}
+
+/// Over short steps the positions have no digits for the accelerations that belong to reactions.
+TEST(Reactions, ThatPositionsDoNotResolveAreSaid) {
+  for (const double dt : {1e-11, 1e-3}) {
+    SCOPED_TRACE(dt);
+    auto setup = plain_square(2, 1e3);
+    hold(setup, 1);
+    setup.initial_velocity.push_back({1, [](const Vec<2>& X, double) { return Vec<2>(0.1 * X[0], 0); }});
+    setup.fields.reaction_forces = true;
+    setup.time.dt = dt;
+    setup.time.steps = 6;
+    int warnings = 0;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry,
+                             Logger([&](LogLevel level, std::string_view) { warnings += level == LogLevel::warning; }));
+    while (simulation.state().step < setup.time.steps) ASSERT_TRUE(simulation.advance().ok);
+    EXPECT_EQ(warnings, dt < 1e-6 ? 1 : 0);
+  }
 }
 
 }  // namespace

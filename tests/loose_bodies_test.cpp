@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "energy/least_motion.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "random_tets.hpp"
 #include "simulation/held_turn.hpp"
 #include "simulation/step_problem.hpp"
@@ -85,6 +85,48 @@ TEST(LooseBodies, InAStackAreHeldByTheFrictionOfNewContact) {
   }
 }
 
+/// A box on another one with a stiffness 27 times its own, above a table: under a stiff barrier both bounce on the way.
+Setup<3> boxes_above_a_table() {
+  Setup<3> setup;
+  setup.mesh = make_cubes(
+      3,
+      [](int i, int j, int k) {
+        constexpr double kHeights[] = {0, 0.7654, 0.81566, 1.58106};
+        return Vec<3>(0.3881 * i, kHeights[j], 0.88624 * k);
+      },
+      [](int i, int j, int k) { return i < 2 && j != 1 && k == 0 ? 1 + j / 2 : kNone; });
+  setup.materials[1] = {.law = MaterialLaw::saint_venant_kirchhoff, .youngs_modulus = 2.173e10, .density = 1000};
+  setup.materials[2] = {.law = MaterialLaw::saint_venant_kirchhoff, .youngs_modulus = 8.157e8, .density = 1000};
+  setup.body_acceleration = [](const Vec<3>&, double) { return Vec<3>(0, -kGravity, 0); };
+  const double height = -0.021;
+  setup.obstacles.rest = {{-50, height, -50}, {0, height, 100}, {50, height, -50}};
+  setup.obstacles.triangles = {{0, 1, 2}};
+  setup.obstacles.edges = {{0, 1}, {1, 2}, {0, 2}};
+  setup.obstacles.motion = {kNone, kNone, kNone};
+  setup.time.is_static = true;
+  setup.contact = {.enabled = true, .activation_distance = 2.7e-4, .convergent = false};
+  setup.contact.friction_coefficient = 0.3;
+  return setup;
+}
+
+TEST(LooseBodies, InAStackLieFlatWithTheFrictionOfContactThatIsThere) {
+  for (const double dhat : {1e-4, 2e-4, 2.7e-4, 5e-4, 1e-3}) {
+    SCOPED_TRACE(dhat);
+    auto setup = boxes_above_a_table();
+    setup.contact.activation_distance = dhat;
+    linear::Registry registry;
+    Simulation<3> simulation(setup, registry);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const auto& state = simulation.state();
+    for (VertexId v = 0; v < state.mesh.node_slots(); ++v) {
+      const Vec<3> X = state.mesh.rest(v), u = state.history.x[0].segment<3>(3 * v) - X;
+      EXPECT_LE(std::hypot(u[0], u[2]), 1e-3) << X.transpose();
+      EXPECT_NEAR(u[1], X[1] < 0.8 ? -0.021 : -0.021 - 0.05026, 2 * dhat) << X.transpose();
+    }
+  }
+}
+
 TEST(LooseBodies, StayWhereNoForceActs) {
   auto setup = square_above_a_table(1e6);
   setup.body_acceleration = {};
@@ -111,6 +153,33 @@ TEST(LooseBodies, InBalanceDoNotDrift) {
     ASSERT_TRUE(result.ok) << result.reason;
     EXPECT_LE(mean_displacement(simulation).norm(), 1e-9);
     EXPECT_GT(result.report.energy.elastic, 0);
+  }
+}
+
+/// A pressure all around resists turns of a linear elastic body, by far less than the body resists strains.
+TEST(LooseBodies, UnderPressureDoNotTurn) {
+  for (const std::string& solver : {"eigen:ldlt", "eigen:lu"}) {
+    SCOPED_TRACE(solver);
+    auto setup = square_above_a_table(8.7e10, solver);
+    setup.materials[1].law = MaterialLaw::linear;
+    setup.body_acceleration = {};
+    setup.contact.enabled = false;
+    setup.obstacles = {};
+    for (const int side : {1, 2, 3, 4}) setup.pressure.push_back({side, [](const Vec<2>&, double t) { return 5 * t; }});
+    setup.time.steps = 4;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    while (simulation.state().step < setup.time.steps) ASSERT_TRUE(simulation.advance().ok);
+    const auto& state = simulation.state();
+    double turn = 0, inwards = 0;
+    for (VertexId v = 0; v < state.mesh.node_slots(); ++v) {
+      const Vec<2> arm = state.mesh.rest(v) - Vec<2>(0.1, 0.1),
+                   u = state.history.x[0].segment<2>(2 * v) - state.mesh.rest(v);
+      turn += arm[0] * u[1] - arm[1] * u[0];
+      inwards -= arm.dot(u);
+    }
+    EXPECT_GT(inwards, 0);
+    EXPECT_LE(std::abs(turn), 1e-4 * inwards);
   }
 }
 

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "c_callbacks.hpp"
-#include "itr/core/error.hpp"
-#include "itr/embed/any_simulation.hpp"
+#include "itr/core.hpp"
 #include "itr/itr.h"
+#include "itr/itr.hpp"
 
 struct itr_model {
   itr::Model model;

@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "arrays.hpp"
+#include "energy/energy.hpp"
 #include "energy/project_block.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "itr/embed/any_simulation.hpp"
+#include "itr/itr.hpp"
 
 namespace itr {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/mesh.hpp"
+#include "itr/scene.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "itr/energy/energy.hpp"
-#include "itr/fem/vertex_map.hpp"
+#include "energy/energy.hpp"
+#include "fem/vertex_map.hpp"
 
 namespace itr {
 

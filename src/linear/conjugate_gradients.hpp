@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/linear/solver.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

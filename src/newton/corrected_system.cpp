@@ -2,13 +2,14 @@
 #include "corrected_system.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
+#include <limits>
 
 namespace itr {
 
 namespace {
 constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
-}
+constexpr double kTrue = 1e-2;  ///< relative residual: the true matrix is as good as the one that was solved with
+}  // namespace
 
 void CorrectedSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjection psd, const DofMap& dofs,
                                PrescribedMotion& motion, Workspace& workspace) {
@@ -20,14 +21,14 @@ void CorrectedSystem::assemble(const Energy& energy, ConstVectorView x, PsdProje
   by_unknown_.resize(dofs.num_unknowns, modes.cols());
   for (Eigen::Index i = 0; i < modes.rows(); ++i)
     if (dofs.unknown[i] != kNone) by_unknown_.row(dofs.unknown[i]) = modes.row(i);
-  inverse_.resize(0);
+  stiffness_.resize(0);
   if (!product_) return;
   MatrixX of_modes(by_unknown_.rows(), by_unknown_.cols());
   for (Eigen::Index k = 0; k < modes.cols(); ++k) product_(by_unknown_.col(k), of_modes.col(k));
   const Eigen::SelfAdjointEigenSolver<MatrixX> reduced(by_unknown_.transpose() * of_modes);
   if (reduced.info() != Eigen::Success) return;
   combinations_ = reduced.eigenvectors();
-  inverse_ = reduced.eigenvalues().unaryExpr([](double value) { return std::abs(value - 1) < kKnown ? 1 / value : 0.0; });
+  stiffness_ = reduced.eigenvalues();
 }
 
 linear::SystemReport CorrectedSystem::solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
@@ -43,15 +44,20 @@ bool CorrectedSystem::solve_columns(const MatrixX& B, MatrixX& X) {
   return true;
 }
 
-/// Makes the residual zero along motions that nothing else resists.
+/// Makes the residual zero along motions that nothing else resists, and along all of them where projections have not made
+/// the solution another one than that of the true matrix.
 void CorrectedSystem::correct(ConstVectorView rhs, VectorView solution) const {
   constexpr int kRounds = 2;
-  if (!product_ || inverse_.size() == 0 || !solution.allFinite()) return;
-  VectorX image(rhs.size());
+  if (!product_ || stiffness_.size() == 0 || !solution.allFinite()) return;
+  VectorX residual(rhs.size());
   for (int round = 0; round < kRounds; ++round) {
-    product_(solution, image);
-    const VectorX missing = combinations_.transpose() * (by_unknown_.transpose() * (rhs - image));
-    const VectorX correction = by_unknown_ * (combinations_ * inverse_.cwiseProduct(missing));
+    product_(solution, residual);
+    residual = rhs - residual;
+    const double most = residual.norm() <= kTrue * rhs.norm() ? std::numeric_limits<double>::infinity() : 1 + kKnown;
+    const VectorX inverse =
+        stiffness_.unaryExpr([&](double value) { return 1 - kKnown < value && value < most ? 1 / value : 0.0; });
+    const VectorX missing = combinations_.transpose() * (by_unknown_.transpose() * residual);
+    const VectorX correction = by_unknown_ * (combinations_ * inverse.cwiseProduct(missing));
     if (!correction.allFinite()) return;
     solution += correction;
   }

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 
@@ -38,8 +38,8 @@ class CorrectedSystem final : public NewtonSystem {
   Modes modes_;
   Product product_;       ///< of the true matrix at the iterate
   MatrixX by_unknown_;    ///< modes
-  MatrixX combinations_;  ///< of the modes: those that nothing else resists
-  VectorX inverse_;       ///< of their stiffness; empty: nothing is corrected
+  MatrixX combinations_;  ///< of the modes, which the true matrix does not couple
+  VectorX stiffness_;     ///< of these combinations, by the known one; empty: nothing is corrected
 };
 
 }  // namespace itr

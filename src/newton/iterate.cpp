@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "iterate.hpp"
 
+#include <limits>
+
 #include "core/timer.hpp"
 
 namespace itr {
@@ -33,15 +35,27 @@ void Iterate::update_gradient() {
   has_gradient_ = true;
   gradient_norm_ = task_.norms.of_gradient(gradient_);
   force_size_ = task_.norms.of_forces(sizes);
+  work_ = sizes.dot(x_.cwiseAbs());
 }
 
 double Iterate::value_round_off() const {
   if (value_round_off_at_ != revision_) {
     const ScopedTimer timer(task_.summary.line_search_seconds);
     value_round_off_ = task_.energy.value_round_off(x_, task_.workspace);
+    if (value_round_off_at_ == kNone) first_round_off_ = value_round_off_;
     value_round_off_at_ = revision_;
   }
   return value_round_off_;
+}
+
+/// Round-off costs as much as a gradient. It is asked for where the first one, and what forces have done since, leave it
+/// open.
+bool Iterate::is_unresolved(const Step& step) const {
+  constexpr double kSafe = 1e4;
+  const double decrement = decrement_of(step);
+  const bool is_open = value_round_off_at_ == kNone ||
+                       decrement < kSafe * (first_round_off_ + std::numeric_limits<double>::epsilon() * work_);
+  return is_open && decrement < value_round_off();
 }
 
 double Iterate::gradient_round_off() const {

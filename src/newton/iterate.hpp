@@ -28,7 +28,7 @@ class Iterate {
   /// The norm of what round-off may change of the gradient.
   double gradient_round_off() const;
   /// Whether a step promises less than the energy resolves.
-  bool is_unresolved(const Step& step) const { return decrement_of(step) < value_round_off(); }
+  bool is_unresolved(const Step& step) const;
 
   double value_at(ConstVectorView x) const;
   void gradient_at(ConstVectorView x, VectorView gradient) const;
@@ -47,7 +47,8 @@ class Iterate {
   VectorView x_, gradient_;
   double value_;
   double gradient_norm_ = 0, force_size_ = 0;
-  mutable double value_round_off_ = 0, gradient_round_off_ = 0;
+  double work_ = 0;  ///< of the sizes of all forces along x
+  mutable double first_round_off_ = 0, value_round_off_ = 0, gradient_round_off_ = 0;
   mutable int value_round_off_at_ = kNone, gradient_round_off_at_ = kNone;  ///< revisions of x
   bool has_gradient_ = false;
   int revision_ = 0;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <span>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

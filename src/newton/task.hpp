@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 #include "norms.hpp"
 
 namespace itr {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/energy/energy.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/energy.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

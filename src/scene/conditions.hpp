@@ -3,7 +3,7 @@
 #pragma once
 
 #include "geometry.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 namespace itr::scene {
 

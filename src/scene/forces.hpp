@@ -3,7 +3,7 @@
 #pragma once
 
 #include "geometry.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 
 namespace itr::scene {
 

@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 #include "node.hpp"
 #include "sets.hpp"
 

@@ -2,7 +2,7 @@
 // From a scene file to one document: `common` and `patch` (docs/scenes.md), root path, command-line overrides.
 #pragma once
 
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {

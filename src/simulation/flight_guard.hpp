@@ -5,8 +5,8 @@
 #include <string>
 
 #include "energy/least_motion.hpp"
-#include "itr/core/units.hpp"
-#include "itr/fem/hessian_sink.hpp"
+#include "fem/hessian_sink.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "simulation/named.hpp"
 #include "simulation/step_terms.hpp"
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"

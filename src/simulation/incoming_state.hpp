@@ -2,7 +2,7 @@
 // States that no step made: the initial one, and a saved one that is restored.
 #pragma once
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 #include "simulation/step.hpp"
 
 namespace itr {

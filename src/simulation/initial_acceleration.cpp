@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

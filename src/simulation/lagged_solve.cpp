@@ -26,6 +26,8 @@ constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: le
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
 
+constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
+
 }  // namespace
 
 /// x with held dofs at their targets, where the straight way there is free.
@@ -86,17 +88,20 @@ NewtonSummary LaggedSolve<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
 
 /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will hold
 /// them, and slide off before the next round unless friction is lagged where contact forces are new: here it is lagged
-/// again as often as those on a body double or halve on the way.
+/// again as often as those on a body double or halve on the way, and at the end where friction itself would.
 template <int Dim>
 NewtonSummary LaggedSolve<Dim>::minimize_first(VectorX& x, VectorX way_to_start) {
-  constexpr int kMostLags = 200;
+  constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
   constexpr double kChange = 2;
   NewtonSummary all;
   const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
-  for (int lags = least_motion_ && potential_.has_friction() ? kMostLags : 0;; --lags) {
+  const bool may_lag = least_motion_ && potential_.has_friction();
+  VectorX best;
+  double least = std::numeric_limits<double>::infinity();
+  for (int on_the_way = 0, at_the_end = 0;;) {
     bool is_outdated = false;
     std::function<bool(const VectorX&)> ends_at;
-    if (lags > 0)
+    if (may_lag && on_the_way < kMostOnTheWay)
       ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
         const std::vector<double> now = contact_forces_on_loose_parts(iterate);
         return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
@@ -104,9 +109,36 @@ NewtonSummary LaggedSolve<Dim>::minimize_first(VectorX& x, VectorX way_to_start)
     NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}), ends_at);
     summary.add_effort(all);
     all = std::move(summary);
-    if (!is_outdated) return all;
-    lagged_.friction = potential_.lag_friction(x, workspace_);
+    if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
+    Lagged next = lagged_;
+    next.friction = potential_.lag_friction(x, workspace_);
+    if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / kChange) return all;
+    lagged_ = std::move(next);
+    ++(is_outdated ? on_the_way : at_the_end);
+    if (!is_outdated) continue;
+    const std::vector<double> forces = contact_forces_on_loose_parts(x);
+    const bool all_touch = std::all_of(forces.begin(), forces.end(), [](double force) { return force > 0; });
+    if (const double residual = residual_of(x, lagged_); all_touch && residual < least) {
+      least = residual;
+      best = x;
+    }
+    // A stiff barrier bounces: the last of these iterates may have forces far too large, or none that hold a body.
+    if (on_the_way == kMostOnTheWay && best.size() > 0) {
+      x = best;
+      lagged_.friction = potential_.lag_friction(x, workspace_);
+    }
   }
+}
+
+/// Norm of the gradient at x, with terms as they are lagged, scaled.
+template <int Dim>
+double LaggedSolve<Dim>::residual_of(const VectorX& x, const Lagged& lagged) {
+  VectorX gradient = VectorX::Zero(x.size());
+  EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+  double squared = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i)
+    if (dofs_.unknown[i] != kNone) squared += gradient[i] * gradient[i];
+  return std::sqrt(squared);
 }
 
 /// Norms of the contact forces, scaled.
@@ -277,7 +309,7 @@ void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now
           how, rounds);
   }
   if (asked > 0 || !lagged_.friction || !now->friction) return;
-  const double off = change_of(x, *now, [](const Traits& term) { return term.kind == TermKind::friction; });
+  const double off = change_of(x, *now, is_friction);
   if (off > kFrictionWorthSaying)
     summary.message += fmt::format(
         "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
@@ -338,17 +370,13 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   std::optional<Lagged> now;  // what is lagged at x, where the last round made it
   for (; summary.converged() && round < rounds; ++round) {
     Lagged next_lagged;
-    VectorX gradient = VectorX::Zero(x.size());
+    double norm = 0;
     {
       const ScopedTimer timer(summary.assembly_seconds);
       problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
       next_lagged = potential_.lag(x, workspace_);
-      EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+      norm = residual_of(x, next_lagged);
     }
-    double norm = 0;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
-    norm = std::sqrt(norm);
     if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
                                      : potential_.has_friction() && norm <= tolerance) {
       end = RoundsEnd::asked;

@@ -25,6 +25,7 @@ class LaggedSolve {
   NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {},
                                 const std::function<bool(const VectorX& x)>& ends_at = {});
   std::vector<double> contact_forces_on_loose_parts(const VectorX& x);
+  double residual_of(const VectorX& x, const Lagged& lagged);
   NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
                               const std::function<bool(const VectorX& x)>& ends_at);
   void follow_least_motion(const EnergySum& sum, const VectorX& d);

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "itr/energy/inertia.hpp"
+#include "energy/inertia.hpp"
 #include "simulation/moment.hpp"
 
 namespace itr {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/projection/transfer.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/transfer.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 

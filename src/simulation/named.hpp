@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "itr/core/types.hpp"
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

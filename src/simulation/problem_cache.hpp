@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 #include "simulation/contact_surface.hpp"
 
 namespace itr {

@@ -5,13 +5,14 @@
 
 #include <algorithm>
 
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/energy.hpp"
+#include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/momentum_change.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 
@@ -195,6 +196,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
+    const auto phase = ScopedPhase::coarse("remeshing");
     if (state.mesh.has_nodes() && state.strata.empty()) state.strata = Strata<Dim>(state.mesh);
     remeshed = operate(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
@@ -202,6 +204,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   if (!remeshed.changed()) return std::nullopt;
 
   const ScopedTimer timer(report.seconds.projection);
+  const auto phase = ScopedPhase::coarse("projection");
   TouchedCells touched{removed_cells(before.mesh, state.mesh), {}};
   auto map = state.mesh.compact();
   state.strata.compact(map);

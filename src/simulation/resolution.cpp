@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kSpacing = std::numeric_limits<double>::epsilon();
 constexpr double kDigits = 1e3;  ///< spacings of positions that a motion or strain has to be worth
+constexpr double kAbove = 4;     ///< times a motion: its estimate, from the size of a body, not of what bends
 
 /// The largest of what acts on the bodies of a setup.
 struct Actions {
@@ -68,30 +69,37 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   const Setup<Dim>& setup = simulation.setup();
   const TimeOptions& time = setup.time;
   const History& history = simulation.state().history;
-  Actions actions;
-  if (!history.v.empty() && history.v[0].size() > 0) actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
+  Actions actions, first;
+  const bool has_inertia = !time.quasistatic && !time.is_static;
+  if (has_inertia && !history.v.empty() && history.v[0].size() > 0)
+    actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
   add_loads(setup, time.time_after(time.first_step + 1), actions);
+  first = actions;
   if (time.steps > 1) add_loads(setup, time.time_after(time.first_step + time.steps), actions);
   if (!actions.is_any()) return;
   const Eigen::Index bodies = history.x[0].size() - Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const double farthest = history.x[0].head(bodies).template lpNorm<Eigen::Infinity>();
   const double spacing = kSpacing * farthest;
   double motion = actions.motion, strain = 0;
+  if (!first.is_any()) first = actions;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     const double length = size.diagonal, stress = actions.traction + material.density * actions.acceleration * length;
     const double of_load = stress / material.youngs_modulus;
     strain = std::max({strain, of_load, actions.displacement / length,
                        actions.speed / std::sqrt(material.youngs_modulus / material.density)});
-    if (time.quasistatic || time.is_static)
-      motion = std::max(motion, of_load * length);
+    const double at_rest =
+        (first.traction + material.density * first.acceleration * length) / material.youngs_modulus * length;
+    const double in_flight = time.dt * time.dt * (first.acceleration + first.traction / (material.density * length));
+    if (!has_inertia)
+      motion = std::max(motion, at_rest);
     else
-      motion = std::max(motion, time.dt * (actions.speed + time.dt * (actions.acceleration +
-                                                                      actions.traction / (material.density * length))));
+      motion =
+          std::max(motion, time.dt * first.speed + (setup.dirichlet.empty() ? in_flight : std::min(in_flight, at_rest)));
   }
   if (time.is_static) motion = std::max(motion, actions.displacement);
   const Units& units = setup.units;
-  if (motion < kDigits * spacing)
+  if (motion < kAbove * kDigits * spacing)
     found.push_back(fmt::format(
         "bodies move by about {} in the first step, and positions up to {} from the origin are {} apart: results of single "
         "steps are round-off; a larger dt, or a scene near the origin, helps",

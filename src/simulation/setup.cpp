@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <limits>
 #include <set>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "simulation/force_target.hpp"
 
 namespace itr {

@@ -2,15 +2,15 @@
 // The incremental potential of one time step on one mesh, and its solution: terms that the scene needs and no others.
 #pragma once
 
+#include "energy/contact/stiffness.hpp"
+#include "energy/incremental_potential.hpp"
 #include "energy/least_motion.hpp"
-#include "itr/energy/contact/stiffness.hpp"
-#include "itr/energy/incremental_potential.hpp"
-#include "itr/newton/newton.hpp"
-#include "itr/simulation/frame.hpp"
-#include "itr/simulation/setup.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/frame.hpp"
+#include "itr/setup.hpp"
+#include "newton/newton.hpp"
 #include "simulation/problem_cache.hpp"
 #include "simulation/step_terms.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/rest_box.hpp"
 
 namespace itr {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

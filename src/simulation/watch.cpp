@@ -34,11 +34,13 @@ double stiffness(const Setup<Dim>& setup) {
 }  // namespace
 
 template <int Dim>
-void Watch<Dim>::look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger) {
+void Watch<Dim>::look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const NodalForces& forces,
+                      const Logger& logger) {
   if (!has_said_rotation_) find_rotation(setup, state, logger);
   if (!has_said_remeshing_) find_starved_remeshing(setup, report, logger);
   if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
   find_wide_gaps(setup, state, report, logger);
+  if (!has_said_reactions_) find_unbalanced_reactions(setup, report, forces, logger);
 }
 
 template <int Dim>
@@ -125,6 +127,25 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
       "surfaces that press each other stand off by about {}, {:.2g} % of the way that bodies would be compressed by without "
       "gaps: forces may be too large by as much; a smaller /contact/dhat than {} helps",
       setup.units.text(gap_, "m", 2), 100 * gap_share_, setup.units.text(setup.contact.activation_distance, "m", 2)));
+}
+
+/// Reactions are off by what the balance of forces lacks at free vertices.
+template <int Dim>
+void Watch<Dim>::find_unbalanced_reactions(const Setup<Dim>& setup, const StepReport& report, const NodalForces& forces,
+                                           const Logger& logger) {
+  const auto largest = [](const VectorX& force) {
+    return force.size() > 0 ? std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff()) : 0;
+  };
+  largest_reaction_ = std::max(largest_reaction_, largest(forces.reaction));
+  const double left = largest(forces.residual);
+  unbalanced_steps_ = left > kForceError * largest_reaction_ && largest_reaction_ > 0 ? unbalanced_steps_ + 1 : 0;
+  if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && report.step >= setup.time.steps)) return;
+  has_said_reactions_ = true;
+  logger.warning(fmt::format(
+      "step {}: {} are left of the balance of forces at a vertex, {:.2g} % of the largest reaction: reactions may be off by "
+      "as much; over steps of {} positions may have too few digits for accelerations, which a longer /time/dt mends, or a "
+      "tolerance is too large",
+      report.step, setup.units.text(left, "N", 2), 100 * left / largest_reaction_, setup.units.text(setup.time.dt, "s", 3)));
 }
 
 template class Watch<2>;

@@ -33,7 +33,6 @@ ROOT = HERE.parent.parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 import simple_scenes  # noqa: E402
 from harness import stored  # noqa: E402
-from harness.scenes import with_polyfem_defaults  # noqa: E402
 
 TIME_LIMIT = 120  # seconds of a run, after which it counts as stopped
 VERDICTS = ("right", "said", "wrong without a word", "stopped")
@@ -116,8 +115,7 @@ def write_scene(scene, folder, seed, number):
     folder.mkdir(parents=True)
     for name, (points, cells, tags) in scene.meshes.items():
         write_msh(folder / name, points, cells, tags, "4.1" if (seed + number) % 2 else "2.2")
-    content = with_polyfem_defaults(scene.content)
-    (folder / "scene.json").write_text(json.dumps(content, indent=1) + "\n")
+    (folder / "scene.json").write_text(json.dumps(scene.content, indent=1) + "\n")
 
 
 def package_beside(itr):

@@ -7,9 +7,9 @@
 #include <span>
 
 #include "core/parallel_reduce.hpp"
+#include "energy/elastic/neo_hookean.hpp"
 #include "energy/project_block.hpp"
-#include "itr/energy/elastic/neo_hookean.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
 #include "jacobian_barrier.hpp"
 
 namespace itr {

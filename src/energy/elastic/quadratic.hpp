@@ -6,14 +6,14 @@
 #include <span>
 #include <vector>
 
+#include "energy/elastic/elastic.hpp"
+#include "energy/elastic/laws.hpp"
+#include "energy/energy.hpp"
+#include "energy/step_limit.hpp"
+#include "fem/cell_set.hpp"
 #include "fem/displacement.hpp"
-#include "itr/core/types.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/energy/step_limit.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadrature.hpp"
+#include "fem/quadrature.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "geometry/dynamic_tree.hpp"
-#include "itr/remesh/fields.hpp"
+#include "remesh/fields.hpp"
 #include "surface_piece.hpp"
 
 namespace itr {

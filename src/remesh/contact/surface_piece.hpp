@@ -8,8 +8,8 @@
 
 #include <boost/container/static_vector.hpp>
 #include "geometry/bvh.hpp"
-#include "itr/geometry/distance.hpp"
-#include "itr/mesh/mesh.hpp"
+#include "geometry/distance.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "change_log.hpp"
-#include "itr/remesh/memory.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/memory.hpp"
 
 namespace itr {
 
