@@ -30,6 +30,7 @@ def main():
     subprocess.run(["cmake", "-S", source, "-B", work, f"-DCMAKE_CXX_COMPILER={clang}", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
                     "-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON", "-DITR_BUILD_TESTS=OFF", "-DCMAKE_BUILD_TYPE=Release"], check=True,
                    stdout=subprocess.DEVNULL)
+    subprocess.run(["cmake", "--build", work, "--target", "itr_commit"], check=True, stdout=subprocess.DEVNULL)  # a header
     entries = [entry for entry in json.loads((work / "compile_commands.json").read_text())
                if pathlib.Path(entry["file"]).is_relative_to(source / "src")]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
