@@ -141,6 +141,11 @@ struct NodalForces {
   std::vector<MomentumChange> remeshing;        ///< StepReport::remeshing by dt: forces [N] and moments [N m]
 };
 
+/// Members of NodalForces on the bodies' vertices, in the order of `itr_force`, and on the obstacles'.
+inline constexpr std::array kForcesOnBodies{&NodalForces::contact, &NodalForces::friction, &NodalForces::reaction,
+                                            &NodalForces::applied, &NodalForces::body,     &NodalForces::residual};
+inline constexpr std::array kForcesOnObstacles{&NodalForces::obstacle_contact, &NodalForces::obstacle_friction};
+
 /// Forces on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact, friction,
 /// reactions, all (with tractions, pressures and forces of the program), body forces, the residual, and the momentum of its
 /// bodies that edits changed.

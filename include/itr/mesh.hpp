@@ -18,6 +18,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <utility>
 #include <vector>
@@ -185,6 +186,16 @@ class ITR_EXPORT Mesh {
   bool is_vertex_alive(VertexId v) const { return vertex_alive_[v]; }
   bool is_cell_alive(CellId c) const { return cells_[c][0] != kNone; }
   bool is_facet_alive(FacetId f) const { return facets_[f][0] != kNone; }
+  /// Ranges of the slots in use, ascending.
+  auto live_vertices() const {
+    return std::views::iota(0, node_slots()) | std::views::filter([this](VertexId v) { return is_vertex_alive(v); });
+  }
+  auto live_cells() const {
+    return std::views::iota(0, cell_slots()) | std::views::filter([this](CellId c) { return is_cell_alive(c); });
+  }
+  auto live_facets() const {
+    return std::views::iota(0, facet_slots()) | std::views::filter([this](FacetId f) { return is_facet_alive(f); });
+  }
   /// Whether there are no dead slots, and vertices come before the nodes of curved edges.
   bool is_compact() const;
 

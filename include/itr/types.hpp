@@ -28,6 +28,9 @@ using EdgeKey = std::array<VertexId, 2>;  ///< an edge by its vertices, smaller 
 
 inline constexpr int kNone = -1;  ///< "no such id", "not an unknown"
 
+/// Instantiates by a macro of the dimension; for the library's sources.
+#define ITR_BOTH_DIMENSIONS(INSTANTIATE) INSTANTIATE(2) INSTANTIATE(3)
+
 /// The `v`-th vertex of an interleaved field.
 template <int Dim, typename Vector>
 auto vertex_of(Vector&& field, int v) {

@@ -5,7 +5,6 @@
 #include <limits>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "c_callbacks.hpp"
 #include "itr/core.hpp"
@@ -221,18 +220,51 @@ itr_status itr_step(itr_simulation* simulation, double dt) {
 itr_status itr_adapt(itr_simulation* simulation, double dt) {
   return with(simulation, [&](itr::AnySimulation& s) { return status_of(s.adapt(dt), simulation->message); });
 }
-double itr_time(const itr_simulation* simulation) {
-  return value_of(simulation, std::numeric_limits<double>::quiet_NaN(), [](const auto& s) { return s.time(); });
-}
-int itr_steps(const itr_simulation* simulation) {
-  return value_of(simulation, -1, [](const auto& s) { return s.steps(); });
-}
-int itr_finished(const itr_simulation* simulation) {
-  return value_of(simulation, -1, [](const auto& s) { return s.finished(); });
-}
-int itr_dimension(const itr_simulation* simulation) {
-  return value_of(simulation, -1, [](const auto& s) { return s.dimension(); });
-}
+// Functions that hand on one value of the simulation, or an array of it.
+#define ITR_VALUE(TYPE, FUNCTION, NONE, VALUE)                                              \
+  TYPE FUNCTION(const itr_simulation* simulation) {                                         \
+    return value_of<TYPE>(simulation, NONE, [](const auto& s) -> TYPE { return s.VALUE; }); \
+  }
+ITR_VALUE(double, itr_time, std::numeric_limits<double>::quiet_NaN(), time())
+ITR_VALUE(int, itr_steps, -1, steps())
+ITR_VALUE(int, itr_finished, -1, finished())
+ITR_VALUE(int, itr_dimension, -1, dimension())
+ITR_VALUE(size_t, itr_num_vertices, 0, num_vertices())
+ITR_VALUE(size_t, itr_num_nodes, 0, num_nodes())
+ITR_VALUE(size_t, itr_num_cells, 0, num_cells())
+ITR_VALUE(size_t, itr_num_facets, 0, num_facets())
+ITR_VALUE(const double*, itr_positions, nullptr, positions().data())
+ITR_VALUE(const double*, itr_velocities, nullptr, velocities().data())
+
+#define ITR_ARRAY(FUNCTION, TYPE, NAME, VALUES)                                                     \
+  itr_status FUNCTION(itr_simulation* simulation, size_t length, TYPE* NAME) {                      \
+    return with(simulation, [&](itr::AnySimulation& s) { copy(s.VALUES(), #NAME, length, NAME); }); \
+  }
+ITR_ARRAY(itr_get_curved_edges, int, edges, curved_edges)
+ITR_ARRAY(itr_get_rest_positions, double, X, rest_positions)
+ITR_ARRAY(itr_get_cells, int, cells, cells)
+ITR_ARRAY(itr_get_bodies, int, bodies, bodies)
+ITR_ARRAY(itr_get_facets, int, facets, facets)
+ITR_ARRAY(itr_get_facet_boundaries, int, ids, facet_boundaries)
+ITR_ARRAY(itr_get_von_mises, double, von_mises, von_mises)
+ITR_ARRAY(itr_get_stress, double, stress, stress)
+
+// Loads on a boundary, by a function or by values at vertices.
+#define ITR_LOAD(SET, VALUES)                                                                                            \
+  itr_status itr_##SET(itr_simulation* simulation, const char* boundary, itr_function function, void* user) {            \
+    return with(simulation, [&](itr::AnySimulation& s) {                                                                 \
+      require(boundary, "boundary");                                                                                     \
+      s.SET(boundary, as_function(function, user));                                                                      \
+    });                                                                                                                  \
+  }                                                                                                                      \
+  itr_status itr_##SET##_values(itr_simulation* simulation, const char* boundary, size_t length, const double* VALUES) { \
+    return with(simulation, [&](itr::AnySimulation& s) {                                                                 \
+      require(boundary, "boundary");                                                                                     \
+      s.SET(boundary, array(#VALUES, VALUES, length));                                                                   \
+    });                                                                                                                  \
+  }
+ITR_LOAD(set_traction, tractions)
+ITR_LOAD(set_pressure, pressures)
 
 itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* mask, itr_function displacement,
                    void* user) {
@@ -246,32 +278,6 @@ itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, cons
   return with(simulation, [&](itr::AnySimulation& s) {
     require(boundary, "boundary");
     s.fix(boundary, array("mask", mask, dimension_of(simulation)), array("displacements", displacements, length));
-  });
-}
-itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
-    s.set_traction(boundary, as_function(traction, user));
-  });
-}
-itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, size_t length,
-                                   const double* tractions) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
-    s.set_traction(boundary, array("tractions", tractions, length));
-  });
-}
-itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
-    s.set_pressure(boundary, as_function(pressure, user));
-  });
-}
-itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, size_t length,
-                                   const double* pressures) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
-    s.set_pressure(boundary, array("pressures", pressures, length));
   });
 }
 itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
@@ -318,60 +324,13 @@ itr_status itr_freeze_mesh(itr_simulation* simulation, int frozen) {
   return with(simulation, [&](itr::AnySimulation& s) { s.freeze_mesh(frozen != 0); });
 }
 
-size_t itr_num_vertices(const itr_simulation* simulation) {
-  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_vertices(); });
-}
-size_t itr_num_nodes(const itr_simulation* simulation) {
-  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_nodes(); });
-}
-itr_status itr_get_curved_edges(itr_simulation* simulation, size_t length, int* edges) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.curved_edges(), "edges", length, edges); });
-}
-size_t itr_num_cells(const itr_simulation* simulation) {
-  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_cells(); });
-}
-size_t itr_num_facets(const itr_simulation* simulation) {
-  return value_of(simulation, std::size_t{0}, [](const auto& s) { return s.num_facets(); });
-}
-const double* itr_positions(const itr_simulation* simulation) {
-  return value_of<const double*>(simulation, nullptr, [](const auto& s) { return s.positions().data(); });
-}
-const double* itr_velocities(const itr_simulation* simulation) {
-  return value_of<const double*>(simulation, nullptr, [](const auto& s) { return s.velocities().data(); });
-}
-
-itr_status itr_get_rest_positions(itr_simulation* simulation, size_t length, double* X) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.rest_positions(), "X", length, X); });
-}
-itr_status itr_get_cells(itr_simulation* simulation, size_t length, int* cells) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.cells(), "cells", length, cells); });
-}
-itr_status itr_get_bodies(itr_simulation* simulation, size_t length, int* bodies) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.bodies(), "bodies", length, bodies); });
-}
-itr_status itr_get_facets(itr_simulation* simulation, size_t length, int* facets) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facets(), "facets", length, facets); });
-}
-itr_status itr_get_facet_boundaries(itr_simulation* simulation, size_t length, int* ids) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.facet_boundaries(), "ids", length, ids); });
-}
-
 itr_status itr_watch_forces(itr_simulation* simulation, int watched) {
   return with(simulation, [&](itr::AnySimulation& s) { s.watch_forces(watched != 0); });
 }
 const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
-  if (!simulation) return nullptr;
-  const itr::NodalForces& forces = simulation->simulation.forces();
-  const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction,
-                                       &forces.applied, &forces.body,     &forces.residual};
-  if (kind < ITR_CONTACT || kind > ITR_RESIDUAL || kinds[kind]->size() == 0) return nullptr;
-  return kinds[kind]->data();
-}
-itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.von_mises(), "von_mises", length, von_mises); });
-}
-itr_status itr_get_stress(itr_simulation* simulation, size_t length, double* stress) {
-  return with(simulation, [&](itr::AnySimulation& s) { copy(s.stress(), "stress", length, stress); });
+  if (!simulation || kind < ITR_CONTACT || kind > ITR_RESIDUAL) return nullptr;
+  const itr::VectorX& forces = simulation->simulation.forces().*itr::kForcesOnBodies[kind];
+  return forces.size() == 0 ? nullptr : forces.data();
 }
 static void copy_resultant(const itr::AnySimulation::Resultants& sum, double* force, double* moment) {
   copy(sum.force, "force", force);

@@ -58,8 +58,6 @@ std::shared_ptr<const Energy> lag_follower(const FollowerForces<Dim>& follower, 
   template class LinearizedForces<Dim>;                                                                                  \
   template std::shared_ptr<const Energy> lag_follower<Dim>(const FollowerForces<Dim>&, const Mesh<Dim>&, const VectorX&, \
                                                            double, double);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kBlock = 256;
 
 struct FromPredictor {
-  KeptVector distance;
+  ScratchVector distance;
 };
 }  // namespace
 
@@ -175,8 +175,6 @@ void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
 #define ITR_INSTANTIATE(Dim)         \
   template class InertiaEnergy<Dim>; \
   template void get_unit_mass_diagonal<Dim>(const CellSet<Dim>&, VectorView);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

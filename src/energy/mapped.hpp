@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <memory>
 
 #include "energy/energy.hpp"
@@ -16,10 +17,41 @@ class MappedEnergy final : public Energy {
   MappedEnergy(std::shared_ptr<const Energy> energy, std::shared_ptr<const VertexMap<Dim>> map)
       : energy_(std::move(energy)), map_(std::move(map)) {}
   std::string_view name() const override { return energy_->name(); }
-  double value(ConstVectorView x, Workspace& workspace) const override;
-  void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
-  double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
+  double value(ConstVectorView x, Workspace& workspace) const override {
+    return energy_->value(map_->positions(x), workspace);
+  }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override {
+    const VectorX y = map_->positions(x);
+    VectorX gradient_in_y = VectorX::Zero(y.size());
+    energy_->add_gradient(y, gradient_in_y, workspace);
+    map_->add_gradient(gradient_in_y, gradient);
+  }
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override {
+    std::vector<int> sources;
+    MatrixX A, HA, product;  // A of one stencil: from the dofs of its sources to its own
+    HessianSink mapped([&](std::span<const int> vertices, const double* block) {
+      sources.clear();
+      for (const int v : vertices) sources.insert(sources.end(), map_->sources(v).begin(), map_->sources(v).end());
+      std::sort(sources.begin(), sources.end());
+      sources.erase(std::unique(sources.begin(), sources.end()), sources.end());
+      const auto rows = Dim * static_cast<Eigen::Index>(vertices.size());
+      A.setZero(rows, Dim * static_cast<Eigen::Index>(sources.size()));
+      for (std::size_t i = 0; i < vertices.size(); ++i)
+        for (std::size_t k = 0; k < map_->sources(vertices[i]).size(); ++k) {
+          const auto j = std::lower_bound(sources.begin(), sources.end(), map_->sources(vertices[i])[k]) - sources.begin();
+          A.block<Dim, Dim>(Dim * static_cast<Eigen::Index>(i), Dim * j)
+              .diagonal()
+              .setConstant(map_->weights(vertices[i])[k]);
+        }
+      HA.noalias() = Eigen::Map<const MatrixX>(block, rows, rows) * A;
+      product.noalias() = A.transpose() * HA;
+      sink.add<Dim>(sources, product.data());
+    });
+    energy_->add_hessian(map_->positions(x), psd, mapped, workspace);
+  }
+  double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override {
+    return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
+  }
 
  private:
   std::shared_ptr<const Energy> energy_;

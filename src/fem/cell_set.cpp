@@ -10,15 +10,12 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   set.rest.insert(set.rest.end(), extra.begin(), extra.end());
   set.num_vertices = static_cast<int>(set.rest.size());
   std::vector<typename CellSet<Dim>::Element> curved;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c))
-      if (const auto element = element_of(mesh, c); element.curved)
-        curved.push_back(element);
-      else
-        set.elements.push_back(element);
+  for (const CellId c : mesh.live_cells()) {
+    const auto element = element_of(mesh, c);
+    (element.curved ? curved : set.elements).push_back(element);
+  }
   set.elements.insert(set.elements.end(), curved.begin(), curved.end());
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     auto& facet = set.facets.emplace_back();
     facet = {mesh.facet(f), mesh.facet_tag(f), mesh.part_of_vertex(mesh.facet(f)[0])};
     facet.curved = find_edge_nodes<Dim - 1>(mesh.facet(f), nodes_of_edges(mesh), facet.edge_nodes);

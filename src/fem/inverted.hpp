@@ -10,8 +10,7 @@ namespace itr {
 /// The first cell that is not positively oriented everywhere, decided exactly; kNone: none.
 template <int Dim>
 CellId find_inverted(const Mesh<Dim>& mesh, ConstVectorView x) {
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     const auto element = element_of(mesh, c);
     const bool is_positive = element.curved ? is_positive_everywhere_exact<Dim>(at_all_nodes<Dim>(element, x))
                                             : is_positively_oriented<Dim>(element.vertices, x);

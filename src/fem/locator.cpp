@@ -2,7 +2,6 @@
 #include "fem/locator.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "fem/cell_set.hpp"
 #include "fem/quadratic.hpp"
@@ -84,8 +83,7 @@ namespace {
 template <int Dim>
 std::vector<CellId> alive_cells(const Mesh<Dim>& mesh) {
   std::vector<CellId> cells;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) cells.push_back(c);
+  for (const CellId c : mesh.live_cells()) cells.push_back(c);
   return cells;
 }
 

@@ -116,8 +116,7 @@ class ChordRefiner {
 template <int Dim>
 RefinedChords<Dim> refine_chords(const Mesh<Dim>& mesh, const ChordLevels& levels) {
   ChordRefiner<Dim> refiner(mesh, levels);
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) refiner.add(f);
+  for (const FacetId f : mesh.live_facets()) refiner.add(f);
   return std::move(refiner).result();
 }
 

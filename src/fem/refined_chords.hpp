@@ -35,8 +35,7 @@ void add_chord_facets(const Mesh<Dim>& mesh, FacetId f, std::vector<typename Mes
 template <int Dim>
 std::vector<typename MeshTypes<Dim>::Facet> boundary_chords(const Mesh<Dim>& mesh) {
   std::vector<typename MeshTypes<Dim>::Facet> chords;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f)) add_chord_facets(mesh, f, chords);
+  for (const FacetId f : mesh.live_facets()) add_chord_facets(mesh, f, chords);
   return chords;
 }
 

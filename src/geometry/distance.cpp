@@ -17,7 +17,7 @@ namespace itr {
 namespace {
 
 constexpr double kParallel = 1e-24;  ///< squared sine of the angle of edges that count as parallel
-/// Closest points that are outside a feature by less than this share of the distance count as inside: the distance is the
+/// Closest points that are outside a feature by less than this fraction of the distance count as inside: the distance is the
 /// same to its square, its gradient to this, and round-off does not decide between the features' second derivatives, which
 /// differ.
 constexpr double kOnBoundary = 1e-9;
@@ -343,8 +343,6 @@ Mat<12> edge_cross_squared_hessian(const Vec<3>* x) {
   template double box_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                              \
   template double pair_distance_squared<Dim>(PairKind, const Vec<Dim>*);                                             \
   template double point_edge_distance_squared<Dim>(const Vec<Dim>&, const Vec<Dim>&, const Vec<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

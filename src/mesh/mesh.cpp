@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <map>
-#include <numeric>
 #include <string>
 
 #include "core/check.hpp"
@@ -241,8 +239,7 @@ std::vector<EdgeKey> Mesh<Dim>::edges() const {
 template <int Dim>
 double Mesh<Dim>::total_volume() const {
   double sum = 0;
-  for (int c = 0; c < cell_slots(); ++c)
-    if (is_cell_alive(c)) sum += volume_[c];
+  for (const CellId c : live_cells()) sum += volume_[c];
   return sum;
 }
 
@@ -387,8 +384,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
   };
   cells_of_.assign(vertices, {});
   facets_of_.assign(vertices, {});
-  for (int c = 0; c < cell_slots(); ++c) {
-    if (!is_cell_alive(c)) continue;
+  for (const CellId c : live_cells()) {
     const int to = map.cell[c] = cells++;
     cells_[to] = renumber(cells_[c]);
     body_[to] = body_[c];
@@ -398,8 +394,7 @@ typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
     inverse_edges_[to] = inverse_edges_[c];
     for (const int v : cells_[to]) cells_of_[v].push_back(to);
   }
-  for (int f = 0; f < facet_slots(); ++f) {
-    if (!is_facet_alive(f)) continue;
+  for (const FacetId f : live_facets()) {
     const int to = map.facet[f] = facets++;
     facets_[to] = renumber(facets_[f]);
     facet_tag_[to] = facet_tag_[f];
@@ -423,8 +418,7 @@ template <int Dim>
 std::string Mesh<Dim>::find_defect() const {
   std::map<Facet, std::pair<int, Facet>> seen;
   int alive = 0;
-  for (int c = 0; c < cell_slots(); ++c) {
-    if (!is_cell_alive(c)) continue;
+  for (const CellId c : live_cells()) {
     ++alive;
     if (!(volume_[c] > 0)) return "cell " + std::to_string(c) + " has rest volume " + std::to_string(volume_[c]);
     if (volume_[c] != simplex_volume<Dim>(corners(c))) return "cell " + std::to_string(c) + " has an outdated volume";
@@ -470,8 +464,7 @@ std::vector<EdgeKey> edges_of_order_2(const Mesh<Dim>& mesh, const std::map<int,
   };
   if (std::none_of(order.begin(), order.end(), [](const auto& entry) { return entry.second == 2; })) return {};
   std::vector<EdgeKey> curved, straight, result;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     auto& edges = is_quadratic(c) ? curved : straight;
     const auto vertices = ascending(mesh.cell(c));
     for (int i = 0; i <= Dim; ++i)

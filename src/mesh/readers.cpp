@@ -2,7 +2,6 @@
 #include "mesh/mesh_file.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/quoted.hpp"

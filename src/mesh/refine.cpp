@@ -78,8 +78,7 @@ Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
 
   std::vector<typename Mesh<Dim>::Cell> cells;
   std::vector<int> body;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     for (const auto& child : children(mesh.cell(c), mid)) {
       cells.push_back(child);
       body.push_back(mesh.body(c));
@@ -87,8 +86,8 @@ Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
   }
 
   std::vector<std::pair<typename Mesh<Dim>::Facet, int>> tagged;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f) && mesh.facet_tag(f) != kNoTag)
+  for (const FacetId f : mesh.live_facets())
+    if (mesh.facet_tag(f) != kNoTag)
       for (const auto& child : children_of_facet(mesh.facet(f), mid)) tagged.emplace_back(child, mesh.facet_tag(f));
 
   Mesh<Dim> refined(std::move(rest), std::move(cells), std::move(body));

@@ -11,8 +11,7 @@ namespace itr {
 template <int Dim>
 Eigen::AlignedBox<double, Dim> rest_box(const Mesh<Dim>& mesh) {
   Eigen::AlignedBox<double, Dim> box;
-  for (VertexId v = 0; v < mesh.node_slots(); ++v)
-    if (mesh.is_vertex_alive(v)) box.extend(mesh.rest(v));
+  for (const VertexId v : mesh.live_vertices()) box.extend(mesh.rest(v));
   return box;
 }
 

@@ -58,8 +58,7 @@ std::vector<InputSheet<Dim>> find_sheets(const Mesh<Dim>& mesh) {
     sheets.push_back({vertices, called, f, normal, normal.norm()});
     sheets.back().neighbours.fill(kNone);
   };
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     const auto& facet = mesh.facet(f);
     const auto around = mesh.cells_of(facet[0]);
     const auto cell = std::find_if(around.begin(), around.end(), [&](CellId c) {
@@ -70,8 +69,7 @@ std::vector<InputSheet<Dim>> find_sheets(const Mesh<Dim>& mesh) {
   std::vector<char> between(mesh.node_slots());
   for (VertexId v = 0; v < mesh.node_slots(); ++v) between[v] = mesh.is_on_interface(v);
   std::vector<std::pair<typename MeshTypes<Dim>::Facet, std::array<int, 3>>> faces;  // vertices, body, cell, place in it
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     for (int k = 0; k <= Dim; ++k) {
       const auto face = opposite_facet<Dim>(mesh.cell(c), k);
       if (std::all_of(face.begin(), face.end(), [&](int v) { return between[v]; }))
@@ -437,8 +435,7 @@ std::string Strata<Dim>::find_misfit(const Mesh<Dim>& mesh) const {
     if (patch < 0 || patch >= num_patches()) return "a facet without a patch at vertex " + std::to_string(sheet.vertices[0]);
   }
   if (interfaces != interfaces_.size()) return "interface facets that are not in the mesh";
-  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
-    if (!mesh.is_vertex_alive(v)) continue;
+  for (const VertexId v : mesh.live_vertices()) {
     const bool held = mesh.is_boundary(v) || mesh.is_on_interface(v) || mesh.cells_of(v).empty();
     if (held != (vertices_[v] != Stratum::volume)) return "stratum of vertex " + std::to_string(v);
   }

@@ -414,8 +414,6 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
 #define ITR_INSTANTIATE(Dim)                                                                          \
   template void write_checkpoint<Dim>(hdf5::File&, const State<Dim>&, const Progress&, const Units&); \
   template Checkpoint<Dim> read_checkpoint<Dim>(const SavedState&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::output

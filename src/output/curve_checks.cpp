@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "curve_checks.hpp"
 
-#include <cmath>
-
 #include "fem/chords.hpp"
 
 namespace itr::output {
@@ -146,13 +144,11 @@ void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surfac
     }
 }
 
-template Patches<2> true_surface(const StoredFrame&, const FrameSurface<2>&);
-template std::set<int> find_in_hollows(const FrameSurface<2>&, const Patches<2>&);
-template void check_curves(const FrameSurface<2>&, const Patches<2>&, const std::string&, std::vector<Violation>&);
-template void measure_overhangs(const StoredFrame&, const FrameSurface<2>&, Certificate&);
-template Patches<3> true_surface(const StoredFrame&, const FrameSurface<3>&);
-template std::set<int> find_in_hollows(const FrameSurface<3>&, const Patches<3>&);
-template void check_curves(const FrameSurface<3>&, const Patches<3>&, const std::string&, std::vector<Violation>&);
-template void measure_overhangs(const StoredFrame&, const FrameSurface<3>&, Certificate&);
+#define ITR_INSTANTIATE(Dim)                                                                                              \
+  template Patches<Dim> true_surface(const StoredFrame&, const FrameSurface<Dim>&);                                       \
+  template std::set<int> find_in_hollows(const FrameSurface<Dim>&, const Patches<Dim>&);                                  \
+  template void check_curves(const FrameSurface<Dim>&, const Patches<Dim>&, const std::string&, std::vector<Violation>&); \
+  template void measure_overhangs(const StoredFrame&, const FrameSurface<Dim>&, Certificate&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::output

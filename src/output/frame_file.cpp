@@ -66,8 +66,8 @@ void write_mesh(const Target& target, const Mesh<Dim>& mesh, ConstVectorView res
     simplices.insert(simplices.end(), mesh.cell(c).begin(), mesh.cell(c).end());
     body.push_back(mesh.body(c));
   }
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (mesh.is_facet_alive(f)) surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
+  for (const FacetId f : mesh.live_facets()) {
+    surface.insert(surface.end(), mesh.facet(f).begin(), mesh.facet(f).end());
   }
   target.write("/mesh/rest", as_span(rest), Dim, "m");
   file.write("/mesh/simplices", simplices, Dim + 1);
@@ -457,8 +457,6 @@ std::vector<StoredField> read_frame_fields(const std::filesystem::path& path) {
                                  const FrameExtra&, const Units&);                                             \
   template int drawn_nodes<Dim>(const FrameView<Dim>&);                                                        \
   template void FrameFiles::write<Dim>(const std::filesystem::path&, const FrameView<Dim>&, int, double, const Units&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::output

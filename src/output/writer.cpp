@@ -251,8 +251,6 @@ void Writer::finish(const std::string& outcome, const std::string& solver) {
   template Writer::Writer(Folder, OutputOptions, RunInfo, const Checkpoint<Dim>&);               \
   template void Writer::write<Dim>(const FrameView<Dim>&, const StepReport&, const State<Dim>*); \
   template void Writer::save<Dim>(const FrameView<Dim>&, const State<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::output

@@ -72,7 +72,7 @@ void add_curved_difference(const TransferMesh<Dim>& old_mesh, int old_cell, cons
         in_old += point.weights[k] * piece.in_b[k];
       }
       const auto new_shapes = shapes_at<Dim>(new_curved, in_new), old_shapes = shapes_at<Dim>(old_curved, in_old);
-      const double weight = density * point.share * piece.volume;
+      const double weight = density * point.fraction * piece.volume;
       for (Eigen::Index column = 0; column < u_old.cols(); ++column) {
         const double gap = old_shapes.dot(values_in<Dim>(old_mesh, old_cell, u_old, column)) -
                            new_shapes.dot(values_in<Dim>(new_mesh, new_cell, u_bar, column));
@@ -161,9 +161,9 @@ class ConstrainedMass {
     polynomials_.resize(inverse_.rows(), Dim + 1);
     for (std::size_t v = 0; v < part_.size(); ++v) {
       const Box<Dim>& box = boxes[part_[v]];
-      const Vec<Dim> way = mesh.rest[v] - 0.5 * (box.min + box.max);
+      const Vec<Dim> motion = mesh.rest[v] - 0.5 * (box.min + box.max);
       const double size = (box.max - box.min).norm();
-      polynomials_.row(v) << 1, way.transpose() / (size > 0 ? size : 1);
+      polynomials_.row(v) << 1, motion.transpose() / (size > 0 ? size : 1);
     }
   }
 
@@ -359,8 +359,6 @@ MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferMesh<Dim>& n
   template VectorX mass_squares<Dim>(const TransferMesh<Dim>&, const MatrixX&);                                             \
   template MatrixX project_l2<Dim>(const TransferMesh<Dim>&, const TransferMesh<Dim>&, const TouchedCells&, const MatrixX&, \
                                    const MatrixX&, std::span<const char>, TransferReport&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -101,8 +101,6 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
   template struct TransferCells<Dim>;                                                                           \
   template TransferPatch<Dim> make_transfer_patch<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const TouchedCells&, \
                                                        const std::map<int, Material>&, int);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

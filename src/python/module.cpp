@@ -335,10 +335,7 @@ void add_simulation(py::module_& m) {
       .def("watch_forces", &AnySimulation::watch_forces)
       .def("forces",
            [](const AnySimulation& s, int kind) -> py::object {
-             const itr::NodalForces& forces = s.forces();
-             const itr::VectorX* const kinds[] = {&forces.contact, &forces.friction, &forces.reaction,
-                                                  &forces.applied, &forces.body,     &forces.residual};
-             const itr::VectorX& values = *kinds[kind];
+             const itr::VectorX& values = s.forces().*itr::kForcesOnBodies[kind];
              if (values.size() == 0) return py::none();
              return copied(std::vector<double>(values.begin(), values.end()), s.dimension());
            })

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "collision_mesh.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include "core/hdf5.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

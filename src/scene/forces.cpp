@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "forces.hpp"
-
 #include <algorithm>
 #include <set>
+
+#include "readers.hpp"
 
 namespace itr::scene {
 
@@ -133,8 +133,6 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
 #define ITR_INSTANTIATE(Dim)                                                                   \
   template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&, const Sets&); \
   template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Sets&, const Mesh<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

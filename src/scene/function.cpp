@@ -163,15 +163,12 @@ void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec
       if (!function(X, t).allFinite()) SceneUnits(value).fail<Dim>(X, t);
 }
 
-template ValueFunction<2> read_function(const Node&, double);
-template ValueFunction<3> read_function(const Node&, double);
-template ValueFunction<2> read_function(const Node&, const Node&);
-template ValueFunction<3> read_function(const Node&, const Node&);
-template ScalarFunction<2> read_scalar_function(const Node&, const Node&);
-template ScalarFunction<3> read_scalar_function(const Node&, const Node&);
-template void check_defined(const SpaceTimeFunction<2>&, const std::vector<Vec<2>>&, const std::vector<double>&,
-                            const Node&);
-template void check_defined(const SpaceTimeFunction<3>&, const std::vector<Vec<3>>&, const std::vector<double>&,
-                            const Node&);
+#define ITR_INSTANTIATE(Dim)                                                                                           \
+  template ValueFunction<Dim> read_function(const Node&, double);                                                      \
+  template ValueFunction<Dim> read_function(const Node&, const Node&);                                                 \
+  template ScalarFunction<Dim> read_scalar_function(const Node&, const Node&);                                         \
+  template void check_defined(const SpaceTimeFunction<Dim>&, const std::vector<Vec<Dim>>&, const std::vector<double>&, \
+                              const Node&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

@@ -38,13 +38,6 @@ struct Collected {
   std::vector<int> point_tags;                                    ///< such keys by vertex, inner ones included
 };
 
-template <int Dim>
-std::string corner_text(const Vec<Dim>& p) {
-  std::string text;
-  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.4g}", c ? ", " : "", p[c]);
-  return "(" + text + ")";
-}
-
 const std::vector<std::array<int, 3>>& cells_of(const MeshFile& file, const Vec<2>&) { return file.triangles; }
 const std::vector<std::array<int, 4>>& cells_of(const MeshFile& file, const Vec<3>&) { return file.tetrahedra; }
 
@@ -256,9 +249,9 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, K
   const Vec<Dim> low = box.min() / units.factor("m"), high = box.max() / units.factor("m");
   const auto note_empty = [&](const Selection<Dim>& selection, const char* what) {
     for (const std::string& pointer : selection.unmatched())
-      warnings.push_back(
-          fmt::format("{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans {} to {} {}",
-                      pointer, what, corner_text<Dim>(low), corner_text<Dim>(high), units.name("m")));
+      warnings.push_back(fmt::format(
+          "{}: selects nothing: no {} is in it, or rules before it took them; the mesh spans ({:.4g}) to ({:.4g}) {}",
+          pointer, what, fmt::join(low, ", "), fmt::join(high, ", "), units.name("m")));
   };
   note_empty(keys.volumes, "barycentre of a cell");
   note_empty(keys.surfaces, "barycentre of a boundary facet");
@@ -419,7 +412,9 @@ Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles&
   for (const Node& geometry : geometries.bodies)
     read_body<Dim>(geometry, files.get(geometry), references, sets, all, warnings);
   for (const Node& geometry : geometries.obstacles)
-    if (const Node id = geometry["surface_selection"]; id.exists()) sets.surfaces.key({read_obstacle_label(id)});
+    if (const auto label = read_obstacle_label(geometry);
+        label && (geometry.has("surface_selection") || references.surfaces.contains(*label)))
+      sets.surfaces.key({*label});
   sets.bodies.choose();
   sets.surfaces.choose();
   for (int& body : all.body) body = sets.bodies.id(body);
@@ -459,11 +454,10 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
   return points;
 }
 
-template Mesh<2> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
-template Mesh<3> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&);
-template std::vector<Vec<2>> read_copies(const Node&, const Vec<2>&);
-template std::vector<Vec<3>> read_copies(const Node&, const Vec<3>&);
-template std::vector<Vec<2>> points_of(const MeshFile&);
-template std::vector<Vec<3>> points_of(const MeshFile&);
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template Mesh<Dim> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&); \
+  template std::vector<Vec<Dim>> read_copies(const Node&, const Vec<Dim>&);                                     \
+  template std::vector<Vec<Dim>> points_of(const MeshFile&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

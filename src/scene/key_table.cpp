@@ -10,71 +10,56 @@ namespace itr::scene {
 
 namespace {
 
-Json scalar_schema() { return {{"type", {"number", "string"}}}; }
-Json list_of(const Json& item) { return {{"type", "array"}, {"items", item}}; }
-Json any_of(const Json& a, const Json& b) { return {{"anyOf", {a, b}}}; }
-Json number_schema() { return {{"type", "number"}}; }
-Json natural_schema() { return {{"type", "integer"}, {"minimum", 0}}; }
-/// A number or a name.
-Json id_schema() { return any_of(natural_schema(), {{"type", "string"}}); }
-
-void check_names(const Node& node) {
-  for (const Node& name : node.items()) name.string("");
+const Json& table() {
+  static const Json json = Json::parse(kKeys);
+  return json;
 }
 
-void check_distance(const Node& node) {
-  if (node.json() == "auto") return;
-  if (!node.json().is_number()) node.fail("a number > 0, or \"auto\"");
+/// Checks numbers > 0 where the node has none of some words.
+void check_positive_unless(const Node& node, const std::vector<const char*>& words, const char* expected) {
+  if (std::any_of(words.begin(), words.end(), [&](const char* word) { return node.json() == word; })) return;
+  if (!node.json().is_number()) node.fail(expected);
   node.positive(1);
 }
 
-void check_stiffness(const Node& node) {
-  if (node.json() == "adaptive" || node.json() == "auto") return;
-  if (!node.json().is_number()) node.fail("a number > 0, \"auto\" or \"adaptive\"");
-  node.positive(1);
-}
-
-const std::vector<Kind>& kinds() {
-  static const std::vector<Kind> kinds = {
-      {"number", [](const Node& node) { node.number(0); }, number_schema(), "number"},
-      {"positive", [](const Node& node) { node.positive(1); }, {{"type", "number"}, {"exclusiveMinimum", 0}}, "number > 0"},
-      {"non_negative", [](const Node& node) { node.non_negative(0); }, {{"type", "number"}, {"minimum", 0}}, "number >= 0"},
-      {"share", nullptr, {{"type", "number"}, {"minimum", 0}, {"maximum", 1}}, "number of [0, 1]"},
-      {"integer", [](const Node& node) { node.integer(0); }, {{"type", "integer"}}, "integer"},
-      {"natural", [](const Node& node) { node.integer_at_least(0, 0); }, natural_schema(), "integer >= 0"},
-      {"count",
-       [](const Node& node) { node.integer_at_least(1, 1); },
-       {{"type", "integer"}, {"minimum", 1}},
-       "integer >= 1"},
-      {"boolean", [](const Node& node) { node.boolean(false); }, {{"type", "boolean"}}, "boolean"},
-      {"string", [](const Node& node) { node.string(""); }, {{"type", "string"}}, "string"},
-      {"path", [](const Node& node) { node.string(""); }, {{"type", "string"}}, "path"},
-      {"names", check_names, any_of({{"type", "string"}}, list_of({{"type", "string"}})), "name or list of names"},
-      {"number or expression", nullptr, scalar_schema(), "number or expression"},
-      {"vector", nullptr, list_of(scalar_schema()), "list of numbers or expressions, one a component"},
-      {"number or numbers", nullptr, any_of(number_schema(), list_of(number_schema())), "number or list of numbers"},
-      {"numbers", nullptr, list_of(number_schema()), "list of numbers"},
-      {"booleans", nullptr, list_of({{"type", "boolean"}}), "list of booleans"},
-      {"counts", nullptr, any_of(natural_schema(), list_of(natural_schema())), "list of integers >= 1, one an axis"},
-      {"points", nullptr, list_of(list_of(number_schema())), "two lists of numbers"},
-      {"axis", nullptr, {{"type", {"integer", "string"}}}, "integer or string"},
-      {"id", nullptr, id_schema(), "integer >= 0 or name"},
-      {"id or ids", nullptr, any_of(id_schema(), list_of(id_schema())), "integer, name or list of these"},
-      {"id or all", nullptr, id_schema(), "integer, name or \"all\""},
-      {"positive, auto or adaptive", check_stiffness,
-       any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"enum", {"auto", "adaptive"}}}),
-       "number > 0, \"auto\" or \"adaptive\""},
-      {"positive or auto", check_distance, any_of({{"type", "number"}, {"exclusiveMinimum", 0}}, {{"const", "auto"}}),
-       "number > 0 or \"auto\""},
-      {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }, {{"const", "consistent"}}, "\"consistent\""},
-      {"order", nullptr, any_of({{"enum", {1, 2}}}, {{"type", {"array", "object"}}}), "1, 2 or a list"},
-      {"list", nullptr, Json::object(), "list"},  // of what its rows with `*` say
-      {"object", nullptr, {{"type", "object"}}, "object"},
-      {"", nullptr, Json::object(), "object"}};
-  return kinds;
-}
+/// Checks of kinds whose values their readers do not check.
+const std::map<std::string, void (*)(const Node&)> kChecks = {
+    {"number", [](const Node& node) { node.number(0); }},
+    {"positive", [](const Node& node) { node.positive(1); }},
+    {"non_negative", [](const Node& node) { node.non_negative(0); }},
+    {"integer", [](const Node& node) { node.integer(0); }},
+    {"natural", [](const Node& node) { node.integer_at_least(0, 0); }},
+    {"count", [](const Node& node) { node.integer_at_least(1, 1); }},
+    {"boolean", [](const Node& node) { node.boolean(false); }},
+    {"string", [](const Node& node) { node.string(""); }},
+    {"path", [](const Node& node) { node.string(""); }},
+    {"names",
+     [](const Node& node) {
+       for (const Node& name : node.items()) name.string("");
+     }},
+    {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }},
+    {"positive or auto", [](const Node& node) { check_positive_unless(node, {"auto"}, "a number > 0, or \"auto\""); }},
+    {"positive, auto or adaptive", [](const Node& node) {
+       check_positive_unless(node, {"auto", "adaptive"}, "a number > 0, \"auto\" or \"adaptive\"");
+     }}};
 
 }  // namespace
+
+const std::vector<Key>& keys() {
+  static const std::vector<Key> all = [] {
+    const std::map<std::string, Role> roles = {
+        {"", Role::read},     {"ignored", Role::ignored}, {"unwritten", Role::unwritten},
+        {"only", Role::only}, {"refused", Role::refused}, {"removed", Role::removed}};
+    std::vector<Key> rows;
+    for (const Json& row : table()["keys"]) {
+      const auto text = [&](const char* name) { return row.value(name, ""); };
+      rows.push_back({text("keys"), roles.at(text("role")), text("kind"), text("default"), text("unit"), text("meaning"),
+                      row.value("basic", false), text("refused")});
+    }
+    return rows;
+  }();
+  return all;
+}
 
 std::vector<std::string> expand(const std::string& pointer) {
   const auto open = pointer.find('{');
@@ -89,11 +74,13 @@ std::vector<std::string> expand(const std::string& pointer) {
 }
 
 Kind kind_of(const Key& key) {
-  const std::string name = key.kind;
+  const std::string& name = key.kind;
   if (name.find('|') == std::string::npos) {
-    const auto found = std::find_if(kinds().begin(), kinds().end(), [&](const Kind& kind) { return name == kind.name; });
-    ITR_CHECK(found != kinds().end(), key.pointer, name);
-    return *found;
+    const Json& kinds = table()["kinds"];
+    const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const Json& kind) { return kind["kind"] == name; });
+    ITR_CHECK(found != kinds.end(), key.pointer, name);
+    const auto check = kChecks.find(name);
+    return {name, check == kChecks.end() ? nullptr : check->second, (*found)["schema"], (*found)["words"]};
   }
   Kind kind{name, nullptr, {}, ""};
   std::istringstream words(name);
@@ -107,8 +94,7 @@ Kind kind_of(const Key& key) {
 
 KeyTable::KeyTable() {
   for (const Key& key : keys()) {
-    const std::string fallback = key.fallback;
-    const Entry entry{&key, kind_of(key), Json::parse(fallback.starts_with('(') ? "" : fallback, nullptr, false)};
+    const Entry entry{&key, kind_of(key), Json::parse(key.fallback.starts_with('(') ? "" : key.fallback, nullptr, false)};
     for (const std::string& pattern : expand(key.pointer)) {
       ITR_CHECK(entries_.emplace(pattern, entry).second, "two rows for", pattern);
       for (std::string child = pattern; !child.empty();) {

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <set>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -21,33 +20,20 @@ enum class Role {
   removed     ///< was read before; its meaning is what to set instead
 };
 
-/// Who needs a key.
-enum class Level {
-  expert,  ///< who knows why
-  basic    ///< a first scene of one's own
-};
-
-/// A row. New keys come with their reader and a test; after that `itr schema --markdown > docs/scenes.md`.
+/// A row of keys.json. New keys come with their reader and a test; after that `itr schema --markdown > docs/scenes.md`.
 struct Key {
-  const char* pointer;  ///< `*` stands for the elements of a list, `{a,b}` for either
-  Role role;
-  const char* kind;      ///< of its values: the name of a Kind, or "a|b|c" for one of these words; empty: an object
-  const char* fallback;  ///< JSON of the default, or words in parentheses; empty: none
-  const char* unit;      ///< SI's name of it, as Units takes it; empty: none, or not the same for all
-  const char* meaning;
-  Level level = Level::expert;
+  std::string pointer;  ///< `keys`: `*` stands for the elements of a list, `{a,b}` for either
+  Role role = Role::read;
+  std::string kind;       ///< of its values: the name of a Kind, or "a|b|c" for one of these words; empty: an object
+  std::string fallback;   ///< `default`: text of its JSON, or words in parentheses; empty: none
+  std::string unit;       ///< SI's name of it, as Units takes it; empty: none, or not the same for all
+  std::string meaning;    ///< of a key that is not read: why, or what to set instead
+  bool is_basic = false;  ///< a first scene of one's own needs it
+  std::string refused;    ///< values that are known and refused
 };
-std::span<const Key> keys();
-
-/// JSON of the rows that nothing reads (unread_keys.json): role, keys, reason, and the value where there is one.
-extern const char* const kUnreadKeys;
-
-/// Values of keys that are read, known and refused.
-struct RefusedValue {
-  const char* pointer;
-  const char* values;
-};
-std::span<const RefusedValue> refused_values();
+/// The rows in the order of the page.
+const std::vector<Key>& keys();
+extern const char* const kKeys;  ///< text of keys.json: rows of kinds and of keys
 
 /// Kind of a value, as the reader checks it and as the schema says it.
 struct Kind {

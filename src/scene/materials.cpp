@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "materials.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <set>
 #include <sstream>
 #include <utility>
 
 #include "function.hpp"
+#include "readers.hpp"
 
 namespace itr::scene {
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Writes the table of keys for readers outside: a JSON Schema, and the page docs/scenes.md.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 
@@ -21,7 +23,7 @@ const Default* find_default(const std::string& pointer) {
 
 void describe(const Entry& entry, Json& schema) {
   std::string text = entry.key->meaning;
-  if (const std::string unit = entry.key->unit; !unit.empty()) text += " [" + unit + "]";
+  if (const std::string& unit = entry.key->unit; !unit.empty()) text += " [" + unit + "]";
   schema["description"] = text;
   if (!entry.fallback.is_discarded()) schema["default"] = entry.fallback;
   if (const Default* row = find_default(entry.key->pointer)) schema["default"] = Json::parse(row->value);
@@ -51,7 +53,7 @@ Json schema_of(const std::string& pattern) {
     schema["anyOf"] = {{{"type", "array"}, {"items", item}}, item};  // one that stands for a list of one
   } else if (children) {
     schema = object_schema(pattern, *children);
-    if (entry && *entry->key->kind) schema = {{"anyOf", {schema, entry->kind.schema}}};
+    if (entry && !entry->key->kind.empty()) schema = {{"anyOf", {schema, entry->kind.schema}}};
   }
   if (entry) describe(*entry, schema);
   return schema;
@@ -78,20 +80,20 @@ std::string in_cell(const std::string& text) {
 }
 
 std::string row(const Key& key) {
-  const std::string pointer = key.pointer, parent = parent_of(pointer);
+  const std::string &pointer = key.pointer, parent = parent_of(pointer);
   std::string names, fallback = key.fallback;
   for (const std::string& name : expand(pointer.substr(parent.size() + 1)))
     names += (names.empty() ? "`" : ", `") + name + "`";
-  if (key.level == Level::basic) names = "**" + names + "**";
+  if (key.is_basic) names = "**" + names + "**";
   if (!fallback.empty() && fallback[0] != '(') fallback = "`" + fallback + "`";
   if (const Default* itr = find_default(pointer))
-    fallback = "`" + std::string(itr->value) + "`; PolyFEM's: " + (fallback.empty() ? "none" : fallback);
-  return "| " + names + " | " + in_cell(kind_of(key).words) + " | " + in_cell(fallback) + " | " + key.unit + " | " +
-         in_cell(key.meaning) + " |\n";
+    fallback = fmt::format("`{}`; PolyFEM's: {}", itr->value, fallback.empty() ? "none" : fallback);
+  return fmt::format("| {} | {} | {} | {} | {} |\n", names, in_cell(kind_of(key).words), in_cell(fallback), key.unit,
+                     in_cell(key.meaning));
 }
 
 /// Tells whether a row is of a list's items, which the list's row describes.
-bool is_item(const Key& key) { return std::string(key.pointer).ends_with("/*"); }
+bool is_item(const Key& key) { return key.pointer.ends_with("/*"); }
 
 std::string tables_of_what_is_read() {
   std::vector<std::string> parents = {""};
@@ -116,8 +118,7 @@ std::string list_of_ignored() {
     if (key.role != Role::ignored) continue;
     const auto has_reason = [&](const auto& one) { return one.first == key.meaning; };
     const auto at = std::find_if(reasons.begin(), reasons.end(), has_reason);
-    std::string pointer = "`";
-    pointer.append(key.pointer).append("`");
+    const std::string pointer = "`" + key.pointer + "`";
     if (at == reasons.end())
       reasons.emplace_back(key.meaning, pointer);
     else
@@ -132,9 +133,9 @@ std::string list_of_others(Role role) {
   std::string text;
   for (const Key& key : keys()) {
     if (key.role != role) continue;
-    text += "- `" + std::string(key.pointer) + "`";
-    if (role == Role::only) text += " = `" + std::string(key.fallback) + "`";
-    text += ": " + std::string(key.meaning) + "\n";
+    text += "- `" + key.pointer + "`";
+    if (role == Role::only) text += " = `" + key.fallback + "`";
+    text += ": " + key.meaning + "\n";
   }
   return text;
 }
@@ -154,7 +155,7 @@ std::string list_of_basic_keys() {
       "bold in the tables:\n\n";
   std::string last;
   for (const Key& key : keys()) {
-    if (key.level != Level::basic) continue;
+    if (!key.is_basic) continue;
     const std::string pointer = key.pointer, parent = parent_of(pointer), name = pointer.substr(parent.size() + 1);
     if (parent.empty()) continue;
     text += parent == last ? ", " : (last.empty() ? "- [`" : "\n- [`") + parent + "`](#" + anchor_of(parent) + "): ";
@@ -186,7 +187,8 @@ std::string section_of_refusals() {
       "Nothing is ignored silently.\n\n### Combinations\n\n";
   for (const auto& [place, words] : unsupported_combinations()) text += "- `" + std::string(place) + "`: " + words + "\n";
   text += "\n### Values\n\n";
-  for (const auto& [pointer, values] : refused_values()) text += "- `" + std::string(pointer) + "`: " + values + "\n";
+  for (const Key& key : keys())
+    if (!key.refused.empty()) text += "- `" + key.pointer + "`: " + key.refused + "\n";
   return text + "\n### Keys with one value\n\nAnother value than this one is an error.\n\n" + list_of_others(Role::only) +
          "\n### Keys\n\nTheir presence is an error.\n\n" + list_of_others(Role::refused);
 }

@@ -8,22 +8,110 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
+#include "itr/core.hpp"
+#include "itr/setup.hpp"
 #include "mesh/connected_parts.hpp"
-#include "simulation/held_corners.hpp"
 #include "simulation/incoming_state.hpp"
+#include "simulation/named.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
+#include "simulation/step_terms.hpp"
 #include "sizes.hpp"
 
 namespace itr {
 
 namespace {
+
+constexpr double kResolved = 1e-12;  ///< of the bodies' diagonal
+
+template <int Dim>
+using Conditions = std::vector<const DirichletCondition<Dim>*>;
+
+/// Conditions that hold each vertex, the winner last.
+template <int Dim>
+std::vector<Conditions<Dim>> by_vertex(const Setup<Dim>& setup) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const ConditionsByTag<Dim> all = conditions_by_tag<Dim>(setup);
+  std::vector<Conditions<Dim>> holding(mesh.node_slots());
+  const auto add = [&](VertexId v, const DirichletCondition<Dim>* condition) {
+    std::erase(holding[v], condition);
+    holding[v].push_back(condition);
+  };
+  for (const auto& [tag, condition] : all)
+    for (const FacetId f : mesh.live_facets())
+      if (mesh.facet_tag(f) == tag)
+        for (const VertexId v : mesh.facet(f)) add(v, condition);
+  for (const auto& [tag, condition] : all)
+    for (const VertexId v : mesh.live_vertices())
+      if (mesh.vertex_tag(v) == tag) add(v, condition);
+  return holding;
+}
+
+/// Largest difference of the displacements that two conditions prescribe in a component that both hold, at the ends of the
+/// first, the middle and the last step. Less than `resolved` [m] is none.
+template <int Dim>
+double difference(const DirichletCondition<Dim>& a, const DirichletCondition<Dim>& b, const RestPoint<Dim>& X,
+                  const TimeOptions& time, double resolved) {
+  constexpr double kRounding = 1e-9;
+  double largest = 0;
+  for (const int step : {1, (time.steps + 1) / 2, time.steps}) {
+    const double t = time.time_after(time.first_step + step);
+    const Vec<Dim> of_a = a.displacement(X, t), of_b = b.displacement(X, t);
+    for (int c = 0; c < Dim; ++c) {
+      if (!a.components[c] || !b.components[c]) continue;
+      const double by = std::abs(of_a[c] - of_b[c]);
+      if (by > std::max(resolved, kRounding * std::max(std::abs(of_a[c]), std::abs(of_b[c]))))
+        largest = std::max(largest, by);
+    }
+  }
+  return largest;
+}
+
+struct Contradiction {
+  int vertices = 0;
+  VertexId worst = kNone;
+  double by = 0;  ///< [m]
+};
+
+/// Adds a sentence for each two Dirichlet conditions that ask for different displacements of a vertex which both hold: that
+/// of the larger id counts, and that of points before that of surfaces (see HeldRule).
+template <int Dim>
+void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& found) {
+  std::map<std::pair<int, int>, Contradiction> all;  // of the id that loses and of the one that wins
+  const std::vector<Conditions<Dim>> holding = by_vertex(setup);
+  const double resolved = kResolved * rest_diagonal(setup.mesh);
+  for (VertexId v = 0; v < setup.mesh.node_slots(); ++v)
+    for (std::size_t i = 0; i < holding[v].size(); ++i)
+      for (std::size_t j = i + 1; j < holding[v].size(); ++j) {
+        const auto &loser = *holding[v][i], &winner = *holding[v][j];
+        double by = 0;
+        try {
+          by = difference<Dim>(loser, winner, setup.mesh.point(v), setup.time, resolved);
+        } catch (const InputError&) {  // the step that asks for it says so
+          continue;
+        }
+        if (!(by > 0)) continue;
+        Contradiction& here = all[{loser.tag, winner.tag}];
+        ++here.vertices;
+        if (by > here.by) here = {here.vertices, v, by};
+      }
+  for (const auto& [ids, here] : all) {
+    const std::string winner = set_text(setup.names.surfaces, ids.second);
+    found.push_back(fmt::format(
+        "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
+        "{}: that of {} counts there",
+        set_text(setup.names.surfaces, ids.first), winner, here.vertices, setup.units.text(here.by, "m", 3),
+        point_text<Dim>(setup.mesh.rest(here.worst), setup.units, 4), winner));
+  }
+}
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSliver = 0.1;                  ///< quality below which an element is one
@@ -33,6 +121,7 @@ constexpr double kLargePart = 5;                 ///< of what touches or falls [
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
 constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
+constexpr double kRoundShare = 0.01;             ///< of a body's volume, from which rounds are told of
 constexpr double kGravity[] = {9.7, 9.9};        ///< [m/s^2]
 
 bool is_outside(double value, const double (&range)[2]) { return value < range[0] || value > range[1]; }
@@ -58,8 +147,7 @@ struct MeshFigures {
       longest = std::max(longest, length);
     }
     Eigen::AlignedBox<double, Dim> box;
-    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-      if (!mesh.is_cell_alive(c)) continue;
+    for (const CellId c : mesh.live_cells()) {
       std::array<Vec<Dim>, Dim + 1> corners;
       for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
       const double quality = simplex_quality<Dim>(corners);
@@ -69,16 +157,15 @@ struct MeshFigures {
     size = box.sizes().maxCoeff();
     const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
     center = mesh.rest(0);
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && (mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
+    for (const VertexId v : mesh.live_vertices())
+      if ((mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
   }
 };
 
 template <int Dim>
 std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
   std::map<int, double> volumes;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) volumes[mesh.body(c)] += mesh.volume(c);
+  for (const CellId c : mesh.live_cells()) volumes[mesh.body(c)] += mesh.volume(c);
   return volumes;
 }
 
@@ -93,16 +180,16 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
             : fmt::format("the bodies span {:.4g} m: are lengths in metres? (for a mesh in millimetres /geometry/*/unit is "
                           "\"mm\", for a whole scene /units/length)",
                           figures.size));
-  const bool has_mass = (!setup.time.is_static && !setup.time.quasistatic) || setup.body_acceleration;
+  const bool has_mass = setup.time.has_inertia() || setup.body_acceleration;
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
-      found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", body,
+      found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", set_text(setup.names.bodies, body),
                                   setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
     if (has_mass && is_outside(material.density, kUsualDensity))
-      found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?", body,
-                                  setup.units.from_si(material.density, "kg/m^3"), setup.units.name("kg/m^3"),
-                                  setup.units.name("kg/m^3")));
+      found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?",
+                                  set_text(setup.names.bodies, body), setup.units.from_si(material.density, "kg/m^3"),
+                                  setup.units.name("kg/m^3"), setup.units.name("kg/m^3")));
   }
 }
 
@@ -169,8 +256,8 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
       if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || fixed.contains(part[mesh.cell(c)[0]])) continue;
+  for (const CellId c : mesh.live_cells()) {
+    if (fixed.contains(part[mesh.cell(c)[0]])) continue;
     loose.insert(part[mesh.cell(c)[0]]);
     bodies.insert(mesh.body(c));
   }
@@ -193,16 +280,17 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
         if (!held[Dim * v + c]) free_tags.insert(mesh.facet_tag(f));
   for (const int tag : tags)
     if (!free_tags.contains(tag))
-      found.push_back(fmt::format("a load acts on the surface {}, of which all vertices are held: it moves nothing", tag));
+      found.push_back(fmt::format("a load acts on the surface {}, of which all vertices are held: it moves nothing",
+                                  set_text(setup.names.surfaces, tag)));
 }
 
 template <int Dim>
 void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found) {
-  if (!setup.time.is_static && !setup.time.quasistatic) return;
+  if (setup.time.has_inertia()) return;
   const auto [bodies, parts] = find_loose_parts(setup);
   if (parts == 0) return;
   std::string names;
-  for (const int body : bodies) names += (names.empty() ? "" : ", ") + std::to_string(body);
+  for (const int body : bodies) names += (names.empty() ? "" : ", ") + set_text(setup.names.bodies, body);
   const bool has_friction = setup.contact.friction_coefficient > 0 && setup.contact.friction_iterations != 0;
   found.push_back(fmt::format("{} of the bodies' parts have neither inertia nor a held vertex (id {}): {}", parts, names,
                               !setup.contact.enabled ? "nothing keeps them in place"
@@ -217,6 +305,7 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
   constexpr double kIncompressible = 0.485, kSlender = 0.15, kFewLayers = 3;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
+    const std::string name = set_text(setup.names.bodies, body);
     const auto order = setup.order.find(body);
     if (order != setup.order.end() && order->second == 2) continue;
     const double layers = size.thickness / size.mean_edge;
@@ -231,23 +320,23 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
             fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they are "
                         "too stiff until "
                         "remeshing has refined them; compare with quadratic elements (/space/discr_order: 2)",
-                        body, layers));
+                        name, layers));
       if (keeps_volume && material.poisson_ratio >= kIncompressible)
         found.push_back(fmt::format(
             "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
             "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or "
             "with quadratic elements on a fixed mesh (/space/discr_order: 2)",
-            body, material.poisson_ratio));
+            name, material.poisson_ratio));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(
           fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
                       "lock, forces are too large, often several times; {}",
-                      body, material.poisson_ratio, layers, help));
+                      name, material.poisson_ratio, layers, help));
     else if (is_thin)
       found.push_back(
           fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they "
                       "are too stiff; {}",
-                      body, layers, help));
+                      name, layers, help));
   }
 }
 
@@ -260,12 +349,16 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
     found.push_back("bodies fall along " + vector_text<Dim>(a / setup.units.factor("m/s^2")) + " " +
                     setup.units.name("m/s^2") + ": a scene's rhs pushes in the negative direction, gravity down y is [0, " +
                     fmt::format("{:.4g}", setup.units.from_si(9.81, "m/s^2")) + "]");
+  for (const double factor : {1e-6, 1e-3, 1e3, 1e6})  // of millimetres, and of milliseconds
+    if (!is_outside(a.norm() / factor, kGravity))
+      found.push_back(fmt::format("bodies accelerate by {}: is gravity meant, {}?", setup.units.text(a.norm(), "m/s^2"),
+                                  setup.units.text(a.norm() / factor, "m/s^2")));
 }
 
 /// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
 template <int Dim>
 void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
-  constexpr double kShare = 0.01;
+  constexpr double kFraction = 0.01;
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
   double stiffness = 0;
@@ -273,7 +366,7 @@ void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::st
     stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
   const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
   const double split = *setup.remesh.split.acceptance_tolerance;
-  if (worth > kShare * split)
+  if (worth > kFraction * split)
     found.push_back(fmt::format(
         "Newton ends at steps of {}, which are worth about {}; a split is made for {}{}: refinement "
         "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
@@ -286,7 +379,7 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.contact.enabled) return;
   const State<Dim>& state = simulation.state();
-  const double dhat = setup.contact.activation_distance;
+  const double dhat = setup.contact.dhat;
   Workspace workspace;
   const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const ContactEnergy<Dim> energy(contact.surface, setup.contact, 1, 1);
@@ -300,8 +393,8 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
       found.push_back(fmt::format(
           "d-hat = {} is {:.2g} % of the thickness of body {}, {}: surfaces stand off by up to that, as if what "
           "presses were thicker: forces may be too large by {} percent; /contact/dhat = \"auto\" takes a thousandth",
-          setup.units.text(dhat, "m"), 100 * dhat / size.thickness, body, setup.units.text(size.thickness, "m"),
-          dhat > kLarge * size.thickness ? "tens of" : "some"));
+          setup.units.text(dhat, "m"), 100 * dhat / size.thickness, set_text(setup.names.bodies, body),
+          setup.units.text(size.thickness, "m"), dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
   const std::vector<Vec<Dim>> rest = setup.proxy ? setup.proxy->rest : state.mesh.rest();
   const CollisionSurface surface = contact_surface(setup, state.mesh).surface;  // of nodes alone
@@ -417,7 +510,13 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));
-  if (!setup.time.is_static && !setup.time.quasistatic) foretell_waves(setup, figures, words);
+  for (const auto& [body, share] : shares_of_rounds(setup.mesh))
+    if (share > kRoundShare)
+      words.push_back(fmt::format(
+          "the facets of body {} are off the rounds that they may stand for by about {:.2g} % of its volume: a finer mesh "
+          "follows rounds, remeshing keeps the facets",
+          set_text(setup.names.bodies, body), 100 * share));
+  if (setup.time.has_inertia()) foretell_waves(setup, figures, words);
   return words;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/closed_faces.hpp"
 
-#include <algorithm>
 #include <vector>
 
 #include "energy/contact/candidates.hpp"
@@ -86,7 +85,7 @@ void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const Ve
   const bool has_closed = has_closed_faces(mesh);
   std::vector<char> stay(mesh.num_vertices(), 0);
   if (has_closed) {
-    const double dhat = setup.contact.activation_distance;
+    const double dhat = setup.contact.dhat;
     const auto visit = [&](PairKind kind, const std::array<int, 4>& vertices) {
       if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), x).data()) >= dhat * dhat) return;
       for (int k = 0; k < pair_size(kind); ++k) for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { stay[v] = 1; });
@@ -119,8 +118,6 @@ Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
   template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
   template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
   template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

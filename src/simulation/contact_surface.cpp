@@ -83,7 +83,7 @@ ClosedFaces closed_faces_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, 
   std::vector<Vec<Dim>> rest = mesh.rest();
   rest.insert(rest.end(), setup.obstacles.rest.begin(), setup.obstacles.rest.end());
   const auto is_node_closed = [&](int node) { return node < mesh.num_nodes() && is_closed(mesh, node, age); };
-  ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.activation_distance, coincidence(mesh), is_node_closed);
+  ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.dhat, coincidence(mesh), is_node_closed);
   if (!contact.map) return faces;
   faces.rest = contact.positions(faces.rest);
   faces.is_closed.resize(contact.surface.area.size());
@@ -116,8 +116,6 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   template CollisionSurface collision_surface(const Mesh<Dim>&, const Obstacles<Dim>&);              \
   template std::shared_ptr<const VertexMap<Dim>> proxy_map(const StepSetup<Dim>&, const Mesh<Dim>&); \
   template ContactSurface<Dim> contact_surface(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, int);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

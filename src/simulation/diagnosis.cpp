@@ -10,10 +10,19 @@
 #include <string_view>
 
 #include "fem/quadrature.hpp"
+#include "simulation/named.hpp"
 
 namespace itr {
 
 namespace {
+
+std::span<const int> vertices_of(const ContactStencil& stencil) {
+  return {stencil.vertices.data(), static_cast<std::size_t>(stencil.size())};
+}
+
+bool has(std::span<const int> vertices, int vertex) {
+  return std::find(vertices.begin(), vertices.end(), vertex) != vertices.end();
+}
 
 template <int Dim>
 Vec<Dim> middle_of(std::span<const int> vertices, const VectorX& x) {
@@ -47,24 +56,93 @@ class Diagnosis {
   Diagnosis(const SolveScope<Dim>& scope, const VectorX& x, Workspace& workspace)
       : scope_(scope), x_(x), on_surface_(scope.surface.positions(x)), workspace_(workspace) {}
 
-  void name_limit_of(const VectorX& step, std::string_view which = "the last");
-  /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2)"; empty where the step is free.
-  std::string limit_of(const VectorX& step, double& share);
-  void name_residual_at(int vertex, const EnergySum& sum);
-  void name_worst_cell_at(int vertex);
-  void name_nearest_pair_at(int vertex);
+  void name_limit_of(const VectorX& step, std::string_view which = "the last") {
+    double fraction = 1;
+    const std::string limit = limit_of(step, fraction);
+    if (!limit.empty()) text_ << "; " << fraction << " of " << which << " Newton step is free, limited " << limit;
+  }
+  /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2) m"; empty where the step is free.
+  std::string limit_of(const VectorX& step, double& fraction) {
+    const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
+    StepLimit pair;
+    if (contact()) pair = contact()->step_limit(on_surface_, scope_.surface.motion(step), workspace_);
+    const bool is_pair = pair.step < cell.step;
+    const StepLimit& limit = is_pair ? pair : cell;
+    fraction = limit.step;
+    if (limit.step >= 1) return {};
+    return std::string("by the ") + std::string(limit.kind) + ' ' +
+           (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
+  }
+  void name_residual_at(int vertex, const EnergySum& sum) {
+    Vec<Dim> total = Vec<Dim>::Zero();
+    double largest = -1;
+    std::string_view name;
+    for (const auto& term : sum.terms()) {
+      VectorX gradient = VectorX::Zero(x_.size());
+      term->add_gradient(x_, gradient, workspace_);
+      const Vec<Dim> force = gradient.template segment<Dim>(Dim * vertex) / scope_.scaling;
+      total += force;
+      if (force.norm() <= largest) continue;
+      largest = force.norm();
+      name = term->name();
+    }
+    text_ << "; the largest residual, " << scope_.units.text(total.norm(), "N") << ", is at vertex "
+          << named_cell(std::array{vertex}) << ", where the largest force, " << scope_.units.text(largest, "N")
+          << ", is that of the term '" << name << '\'';
+  }
+  void name_worst_cell_at(int vertex) {
+    double least = std::numeric_limits<double>::infinity();
+    std::span<const int> worst;
+    for (const auto& element : scope_.cells.elements) {
+      const auto look = [&](const Mat<Dim>& F) {
+        if (const double ratio = F.determinant(); ratio < least) {
+          least = ratio;
+          worst = element.vertices;
+        }
+      };
+      bool has_it = false;
+      for_each_node(element, [&](int node) { has_it = has_it || node == vertex; });
+      if (!has_it) continue;
+      if (!element.curved) {
+        look(deformation_gradient<Dim>(element, x_));
+        continue;
+      }
+      const auto nodes = at_nodes<Dim>(element.nodes(), x_);
+      for (const auto& point : closed_quadrature<Dim>(1))
+        look(nodes * shape_gradients<Dim>(element, point.weights).transpose());
+    }
+    if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
+  }
+  void name_nearest_pair_at(int vertex) {
+    if (!contact()) return;
+    const auto acts_on_it = [&](std::span<const int> pair) {
+      const auto* map = scope_.surface.map.get();
+      if (!map) return has(pair, vertex);
+      return std::any_of(pair.begin(), pair.end(), [&](int w) { return has(map->sources(w), vertex); });
+    };
+    double least = std::numeric_limits<double>::infinity();
+    ContactStencil nearest{};
+    for (const ContactStencil& stencil : contact()->active(on_surface_, workspace_)) {
+      if (!acts_on_it(vertices_of(stencil))) continue;
+      const double distance = std::sqrt(contact()->distance(stencil, on_surface_).squared);
+      if (distance >= least) continue;
+      least = distance;
+      nearest = stencil;
+    }
+    if (std::isfinite(least))
+      text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance "
+            << scope_.units.text(least, "m");
+  }
   void append(const std::string& text) { text_ << text; }
   std::string text() const { return text_.str(); }
 
  private:
-  /// "12 13 obstacle 4 near (0.1, 0.2)": vertices at `positions`, the cells' (or, of a proxy's surface, "proxy 12").
+  /// "12 13 obstacle 4 near (0.1, 0.2) m": vertices at `positions`, the cells' (or, of a proxy's surface, "proxy 12").
   std::string named(std::span<const int> vertices, const VectorX& positions, const Vec<Dim>& place, const char* own) const {
     const int bodies = static_cast<int>(positions.size() / Dim) - scope_.num_obstacles;
     std::ostringstream text;
     for (const int v : vertices) text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
-    text << "near (";
-    for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << place[c];
-    text << ')';
+    text << "near " << point_text<Dim>(place, scope_.units, 6) << ' ' << scope_.units.length();
     return text.str();
   }
   std::string named_cell(std::span<const int> vertices) const {
@@ -82,100 +160,6 @@ class Diagnosis {
   Workspace& workspace_;
   std::ostringstream text_;
 };
-
-template <int Dim>
-std::string Diagnosis<Dim>::limit_of(const VectorX& step, double& share) {
-  const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
-  StepLimit pair;
-  if (contact()) pair = contact()->step_limit(on_surface_, scope_.surface.motion(step), workspace_);
-  const bool is_pair = pair.step < cell.step;
-  const StepLimit& limit = is_pair ? pair : cell;
-  share = limit.step;
-  if (limit.step >= 1) return {};
-  return std::string("by the ") + std::string(limit.kind) + ' ' +
-         (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
-}
-
-template <int Dim>
-void Diagnosis<Dim>::name_limit_of(const VectorX& step, std::string_view which) {
-  double share = 1;
-  const std::string limit = limit_of(step, share);
-  if (!limit.empty()) text_ << "; " << share << " of " << which << " Newton step is free, limited " << limit;
-}
-
-template <int Dim>
-void Diagnosis<Dim>::name_residual_at(int vertex, const EnergySum& sum) {
-  Vec<Dim> total = Vec<Dim>::Zero();
-  double largest = -1;
-  std::string_view name;
-  for (const auto& term : sum.terms()) {
-    VectorX gradient = VectorX::Zero(x_.size());
-    term->add_gradient(x_, gradient, workspace_);
-    const Vec<Dim> force = gradient.template segment<Dim>(Dim * vertex) / scope_.scaling;
-    total += force;
-    if (force.norm() <= largest) continue;
-    largest = force.norm();
-    name = term->name();
-  }
-  text_ << "; the largest residual, " << scope_.units.text(total.norm(), "N") << ", is at vertex "
-        << named_cell(std::array{vertex}) << ", where the largest force, " << scope_.units.text(largest, "N")
-        << ", is that of the term '" << name << '\'';
-}
-
-std::span<const int> vertices_of(const ContactStencil& stencil) {
-  return {stencil.vertices.data(), static_cast<std::size_t>(stencil.size())};
-}
-
-bool has(std::span<const int> vertices, int vertex) {
-  return std::find(vertices.begin(), vertices.end(), vertex) != vertices.end();
-}
-
-template <int Dim>
-void Diagnosis<Dim>::name_worst_cell_at(int vertex) {
-  double least = std::numeric_limits<double>::infinity();
-  std::span<const int> worst;
-  for (const auto& element : scope_.cells.elements) {
-    const auto look = [&](const Mat<Dim>& F) {
-      if (const double ratio = F.determinant(); ratio < least) {
-        least = ratio;
-        worst = element.vertices;
-      }
-    };
-    bool has_it = false;
-    for_each_node(element, [&](int node) { has_it = has_it || node == vertex; });
-    if (!has_it) continue;
-    if (!element.curved) {
-      look(deformation_gradient<Dim>(element, x_));
-      continue;
-    }
-    const auto nodes = at_nodes<Dim>(element.nodes(), x_);
-    for (const auto& point : closed_quadrature<Dim>(1))
-      look(nodes * shape_gradients<Dim>(element, point.weights).transpose());
-  }
-  if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
-}
-
-template <int Dim>
-void Diagnosis<Dim>::name_nearest_pair_at(int vertex) {
-  if (!contact()) return;
-  const auto acts_on_it = [&](std::span<const int> pair) {
-    const auto* map = scope_.surface.map.get();
-    if (!map) return has(pair, vertex);
-    return std::any_of(pair.begin(), pair.end(), [&](int w) { return has(map->sources(w), vertex); });
-  };
-  double least = std::numeric_limits<double>::infinity();
-  ContactStencil nearest{};
-  for (const ContactStencil& stencil : contact()->active(on_surface_, workspace_)) {
-    if (!acts_on_it(vertices_of(stencil))) continue;
-    const double distance = std::sqrt(contact()->distance(stencil, on_surface_).squared);
-    if (distance >= least) continue;
-    least = distance;
-    nearest = stencil;
-  }
-  if (std::isfinite(least))
-    text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance "
-          << scope_.units.text(least, "m");
-}
 
 }  // namespace
 
@@ -204,9 +188,10 @@ std::string describe_effort(const SolveScope<Dim>& scope, const NewtonSummary& s
   std::ostringstream blocked, indefinite, text;
   blocked << summary.blocked << " went less than half of their step";
   if (summary.blocked_step.size() == summary.blocked_from.size() && summary.blocked_step.size() > 0) {
-    double share = 1;
-    const std::string limit = Diagnosis<Dim>(scope, summary.blocked_from, workspace).limit_of(summary.blocked_step, share);
-    if (!limit.empty()) blocked << ", the last " << share << " of it, stopped " << limit;
+    double fraction = 1;
+    const std::string limit =
+        Diagnosis<Dim>(scope, summary.blocked_from, workspace).limit_of(summary.blocked_step, fraction);
+    if (!limit.empty()) blocked << ", the last " << fraction << " of it, stopped " << limit;
   }
   indefinite << summary.indefinite << " met an indefinite Hessian";
   text << summary.iterations << " Newton iterations: "

@@ -100,7 +100,7 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance, age);
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.dhat, age);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)
@@ -111,10 +111,9 @@ class HistoryTransfer {
     }
     SafeProjectionReport<Dim> safe;
     const auto& patch = patch_.new_cells;
-    VectorX x =
-        project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
-                             setup_.contact.activation_distance, std::move(held), parts_of(patch.view()), kRings<Dim>},
-                            interpolant, goal, solver, safe);
+    VectorX x = project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
+                                     setup_.contact.dhat, std::move(held), parts_of(patch.view()), kRings<Dim>},
+                                    interpolant, goal, solver, safe);
     report.with_barriers += safe.used_barriers;
     report.not_converged += !safe.converged;
     lost += safe.lost;
@@ -133,9 +132,8 @@ class HistoryTransfer {
 
 template <int Dim>
 bool depends_on_past(const StepSetup<Dim>& setup) {
-  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
   const bool has_friction = setup.contact.enabled && setup.contact.friction_coefficient > 0;
-  return has_inertia || has_friction || !setup.damping.empty() || !setup.terms.empty();
+  return setup.time.has_inertia() || has_friction || !setup.damping.empty() || !setup.terms.empty();
 }
 
 template <int Dim>
@@ -155,7 +153,7 @@ HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<D
   add(old_history.v, history.v);
   add(old_history.a, history.a);
   const TimeIntegrator integrator(setup.time);
-  const bool has_inertia = !setup.time.quasistatic && !setup.time.is_static;
+  const bool has_inertia = setup.time.has_inertia();
   if (has_inertia) transfer.add(integrator.predictor(old_history), integrator.predictor(history));
   HistoryTransferReport report = transfer.run(fields, history.x.size(), solver);
   if (has_inertia) report.loss = std::max(0.0, transfer.loss(integrator.predictor(history)));
@@ -166,8 +164,6 @@ HistoryTransferReport transfer_history(const StepSetup<Dim>& setup, const Mesh<D
   template bool depends_on_past<Dim>(const StepSetup<Dim>&);                                                    \
   template HistoryTransferReport transfer_history<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const History&, \
                                                        const Mesh<Dim>&, const TouchedCells&, linear::Solver&, History&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -4,45 +4,40 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <set>
 #include <string>
 #include <utility>
 
+#include <memory>
 #include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/named.hpp"
 
 namespace itr {
 
 namespace {
 
-template <int Dim>
-std::string describe(const Vec<Dim>& p, const Units& units) {
-  std::string text;
-  for (int c = 0; c < Dim; ++c) text += fmt::format("{}{:.6g}", c ? ", " : "(", units.from_si(p[c], "m"));
-  return text + ")";
-}
+constexpr int kDigits = 6;  ///< of places
 
 /// Where no surfaces cross: what is wholly inside of a body.
 template <int Dim>
 void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   if (setup.proxy) return;
   const auto refuse = [&](const char* what, const Vec<Dim>& p) {
-    throw InputError({"", "initial state",
-                      fmt::format("{} inside of a body, at {} {}", what, describe(p, setup.units), setup.units.length()),
-                      "surfaces that do not touch"});
+    throw InputError(
+        {"", "initial state",
+         fmt::format("{} inside of a body, at {} {}", what, point_text<Dim>(p, setup.units, kDigits), setup.units.length()),
+         "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   if (!has_closed_faces(state.mesh)) {
     for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
-             overlap.depth > setup.contact.activation_distance) {
+  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords); overlap.depth > setup.contact.dhat) {
     refuse("a body", overlap.place);
   }
   for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)
@@ -116,11 +111,12 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const CollisionSurface& surface = contact.surface;
   const VectorX x = contact.positions(state.history.x[0]);
+  const int bodies = static_cast<int>(x.size() / Dim - setup.obstacles.rest.size());
   const auto corners = [&](const auto& primitive) {
     std::string text;
     for (const int v : primitive)
-      text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v), setup.units));
-    return text;
+      text.append(text.empty() ? "" : "-").append(point_text<Dim>(x.segment<Dim>(Dim * v), setup.units, kDigits));
+    return text + (primitive[0] < bodies ? "" : " of an obstacle");
   };
   constexpr std::size_t kMostNamed = 5;
   const auto pairs = find_intersections<Dim>(surface, x, kMostNamed + 1);
@@ -133,7 +129,8 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   }
   if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
-                    "surfaces that do not touch, but for faces of bodies that coincide at rest"});
+                    "surfaces that do not touch, but for faces of bodies that coincide at rest; parts that are pressed into "
+                    "each other begin apart, and a prescribed motion brings them together"});
 }
 
 template <int Dim>
@@ -192,8 +189,44 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
   template State<Dim> initial_state(const Setup<Dim>&);                     \
   template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
   template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
+
+template <int Dim>
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache) {
+  SparseSystem& system = cache.system;
+  StepProblem<Dim> problem(setup, state.mesh, state.history, state.t, cache, state.stiffness, {}, state.chords);
+  VectorX force = problem.total_force(state.history.x[0], state.history.v[0]);
+  const DofMap& dofs = problem.dofs();
+  VectorX& a = state.history.a[0];
+  const VectorX zero = VectorX::Zero(a.size());
+  EnergySum sum;
+  const auto inertia = std::make_shared<InertiaEnergy<Dim>>(problem.cells(), setup.materials,
+                                                            setup.lump_mass ? MassKind::lumped : MassKind::consistent, zero);
+  sum.add(inertia);
+  VectorX held = a;
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) held[i] = 0;
+  VectorX of_held = zero;
+  inertia->add_mass_product(held, of_held);
+  Workspace workspace;
+  PrescribedMotion motion;
+  VectorX rhs(dofs.num_unknowns), solution(dofs.num_unknowns);
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) rhs[dofs.unknown[i]] = force[i] - of_held[i];
+  if (dofs.num_unknowns == 0) return;
+  system.assemble(sum, zero, PsdProjection::none, dofs, motion, workspace);
+  linear::Outcome outcome = rhs.allFinite() ? system.factorize(0).outcome : linear::Outcome::non_finite;
+  if (outcome == linear::Outcome::ok) outcome = system.solve_again(rhs, solution).outcome;
+  if (outcome != linear::Outcome::ok)
+    throw InputError({"", "/initial_conditions/acceleration",
+                      "\"consistent\", but M a = f cannot be solved at the start: " + std::string(to_string(outcome)) +
+                          ", " + (rhs.allFinite() ? system.message() : "a force is not finite"),
+                      "masses above 0 and a solver that copes with the mass matrix, or a given acceleration"});
+  for (Eigen::Index i = 0; i < a.size(); ++i)
+    if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
+}
+
+template void set_consistent_acceleration<2>(const Setup<2>&, State<2>&, ProblemCache<2>&);
+template void set_consistent_acceleration<3>(const Setup<3>&, State<3>&, ProblemCache<3>&);
 
 }  // namespace itr

@@ -3,7 +3,9 @@
 #pragma once
 
 #include "itr/setup.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 
@@ -22,5 +24,10 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state);
 /// Throws InputError for a state that no steps of this setup lead to.
 template <int Dim>
 void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state);
+
+/// Makes state.history.a[0] solve M a = f with all forces of the setup at the start: elastic, loads, contact, friction and
+/// damping. Held dofs keep theirs. Throws InputError with the reason where that has no solution.
+template <int Dim>
+void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache);
 
 }  // namespace itr

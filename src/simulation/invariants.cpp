@@ -16,12 +16,12 @@ namespace {
 /// `overlap`: by how much where, or infinitely much of edges.
 template <int Dim>
 std::string pressed_faces(const Overlap<Dim>& overlap, double dhat, const Units& units) {
-  std::string place;
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:.4g}", c ? ", " : "", units.from_si(overlap.place[c], "m"));
+  const Vec<Dim> place = overlap.place / units.factor("m");
   return fmt::format(
-      "faces that coincide at rest are pressed into each other, by {}more than d-hat, {}, at ({}): contact acts between "
+      "faces that coincide at rest are pressed into each other, by {}more than d-hat, {}, at ({:.4g}): contact acts between "
       "them only once they have been apart by d-hat; where they are to be pressed together, leave a gap between them",
-      std::isfinite(overlap.depth) ? units.text(overlap.depth, "m", 3) + ", " : "", units.text(dhat, "m", 3), place);
+      std::isfinite(overlap.depth) ? units.text(overlap.depth, "m", 3) + ", " : "", units.text(dhat, "m", 3),
+      fmt::join(place, ", "));
 }
 
 template <int Dim>
@@ -41,7 +41,7 @@ std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   if (const CellId c = find_inverted(mesh, x); c != kNone) return "cell " + std::to_string(c) + " is inverted";
   if (!setup.contact.enabled) return {};
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
-  const double dhat = setup.contact.activation_distance;
+  const double dhat = setup.contact.dhat;
   const bool has_closed = !contact.surface.closed.empty();
   const auto overlap = has_closed ? body_boundary(mesh, x, chords).find_overlap(contact.surface.closed) : Overlap<Dim>{};
   if (overlap.depth > dhat && std::isfinite(overlap.depth)) return pressed_faces(overlap, dhat, setup.units);

@@ -1,427 +1,522 @@
 // SPDX-License-Identifier: MIT
-#include "simulation/lagged_solve.hpp"
+// Solution of one step's problem, in rounds for the terms that are lagged: friction, damping, pressure without a potential.
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
-#include "flight_guard.hpp"
+#include "energy/least_motion.hpp"
+#include "fem/hessian_sink.hpp"
 #include "held_turn.hpp"
-#include "lagging_rounds.hpp"
+#include "itr/core.hpp"
+#include "itr/types.hpp"
+#include "named.hpp"
 #include "newton/corrected_system.hpp"
+#include "simulation/step_problem.hpp"
 
 namespace itr {
 
 namespace {
 
-constexpr std::size_t kLongestCycle = 16;      ///< rounds that are remembered
-constexpr int kPressureRounds = 50;            ///< most, where pressure has no potential
-constexpr int kMostRounds = 1000;              ///< where no number limits them
-constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: less is not said
+constexpr double kFar = 10, kFarthest = 100;  ///< times the extent: of loose parts, of any node
+
+template <int Dim>
+double extent_of(ConstVectorView start, const DofMap& dofs, ConstVectorView target) {
+  Eigen::AlignedBox<double, Dim> box;
+  for (Eigen::Index i = 0; i < start.size(); i += Dim) {
+    const Vec<Dim> here = start.segment<Dim>(i);
+    box.extend(here);
+    for (int c = 0; c < Dim; ++c) {
+      if (dofs.unknown[i + c] != kNone) continue;
+      Vec<Dim> there = here;
+      there[c] = target[i + c];
+      box.extend(there);
+    }
+  }
+  return box.diagonal().norm();
+}
+
+/// Ends solves without inertia in which loads carry bodies farther than anything of the scene could meet them.
+template <int Dim>
+class FlightGuard {
+ public:
+  /// `start`: positions where the step begins, of obstacles too; `target`: those to which held dofs move; `loose`: parts
+  /// that conditions do not hold. All of them must outlive this.
+  FlightGuard(ConstVectorView start, const DofMap& dofs, ConstVectorView target, std::span<const LoosePart<Dim>> loose)
+      : start_(start), loose_(loose), extent_(extent_of<Dim>(start, dofs, target)) {}
+  /// Whether a loose part, or any node, has gone too far by the displacements d.
+  bool has_flown(ConstVectorView d) {
+    for (const LoosePart<Dim>& part : loose_) {
+      if (!(d.segment<Dim>(Dim * part.nodes.front()).norm() > kFar * extent_)) continue;
+      flown_ = &part;
+      return true;
+    }
+    return d.lpNorm<Eigen::Infinity>() > kFarthest * extent_;
+  }
+  /// The reason, once that is so.
+  std::string describe(const Units& units) const {
+    if (!flown_)
+      return fmt::format(
+          "loads move bodies that their conditions hold by {:g} times the extent of the scene: they exceed what the bodies "
+          "can "
+          "carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
+          kFarthest);
+    return fmt::format(
+        "loads push a body that its conditions do not hold, the one at {}, and nothing comes in its way: there is no "
+        "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
+        point_text<Dim>(start_.template segment<Dim>(Dim * flown_->nodes.front()), units, 3));
+  }
+
+ private:
+  ConstVectorView start_;
+  std::span<const LoosePart<Dim>> loose_;
+  double extent_;                          ///< of bodies, obstacles and targets [m]
+  const LoosePart<Dim>* flown_ = nullptr;  ///< null: a body that conditions hold
+};
+
+constexpr double kFixedPoint = 1e-12;       ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
+constexpr double kSameState = 1e-3;         ///< of a solve's step tolerance: states nearer than that are one
+constexpr std::size_t kLongestCycle = 16;   ///< rounds that are remembered
+constexpr int kPressureRounds = 50;         ///< most, where pressure has no potential
+constexpr int kMostRounds = 1000;           ///< where no number limits them
+constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
 
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
 
+/// How rounds of lagging end.
+enum class RoundsEnd {
+  settled,  ///< another round changes nothing, to the solver's tolerances
+  asked,    ///< as many as the scene asks for, or forces to its tolerance
+  most,     ///< as many as there may be
+  cycle,    ///< an earlier round has been reached again
+  stalled   ///< forces have not come nearer for long
+};
+
+/// Says how rounds ended that did not settle.
+std::string_view to_string(RoundsEnd end) {
+  return end == RoundsEnd::most ? "out of rounds" : end == RoundsEnd::cycle ? "in a cycle" : "not coming nearer";
+}
+
+/// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
+/// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
+std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
+                                      double diagonal) {
+  const double last = (x - previous.back()).lpNorm<Eigen::Infinity>();
+  if (last <= kFixedPoint * diagonal) return RoundsEnd::settled;
+  const bool has_met = std::any_of(previous.begin(), previous.end() - 1,
+                                   [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
+  if (!has_met) return std::nullopt;
+  return (x - previous.back()).norm() <= step_tolerance ? RoundsEnd::settled : RoundsEnd::cycle;
+}
+
 }  // namespace
 
-/// x with held dofs at their targets, where the straight way there is free.
+/// Solves a problem and leaves in it the solution, its lagged terms and the barrier stiffness.
 template <int Dim>
-VectorX LaggedSolve<Dim>::start_of_solve(const VectorX& x) {
-  const VectorX start = with_held_at_targets(x);
-  const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
-                    (!cells_.has_curved() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
-                    potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
-  return free ? start : x;
-}
-
-/// `summary` with the reason of a failure.
-template <int Dim>
-NewtonSummary LaggedSolve<Dim>::explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
-  if (summary.converged()) return summary;
-  const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-  if (const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target); !turn.empty())
-    summary.message = turn + "; " + summary.message;
-  summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
-                                    sum, x, workspace_);
-  return summary;
-}
-
-/// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms before
-/// held dofs move: so it is in the regression values of peers' scenes.
-template <int Dim>
-NewtonSummary LaggedSolve<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start,
-                                                const std::function<bool(const VectorX& x)>& ends_at) {
-  const EnergySum sum = potential_.sum(lagged_);
-  if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
-  NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
-                      .on_iteration = setup_.on_iteration,
-                      .must_be_minimum = !terms_.has_inertia};
-  if (way_to_start.size() > 0) {
-    extras.gradient_of_way = VectorX::Zero(x.size());
-    potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
-    extras.way_to_start = std::move(way_to_start);
-  }
-  if (cells_.has_curved()) {
-    potential_.elastic()->refine_quadrature(x);
-    extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
-  }
-  if (!adaptive_) return minimize_from(x, sum, std::move(extras), ends_at);
-  problem_.initialize_stiffness(x);
-  x = start_of_solve(x);
-  bool is_first = true;
-  extras.after_step = [&](const VectorX& d) {
-    const VectorX iterate = base_ + d;
-    const bool refined = potential_.elastic()->refine_quadrature(iterate);
-    if (std::exchange(is_first, false) || setup_.time.is_static) return refined;
-    const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
-    if (changed) potential_.contact()->set_stiffness(stiffness_.value);
-    return changed || refined;
-  };
-  return minimize_from(x, sum, std::move(extras), ends_at);
-}
-
-/// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will hold
-/// them, and slide off before the next round unless friction is lagged where contact forces are new: here it is lagged
-/// again as often as those on a body double or halve on the way, and at the end where friction itself would.
-template <int Dim>
-NewtonSummary LaggedSolve<Dim>::minimize_first(VectorX& x, VectorX way_to_start) {
-  constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
-  constexpr double kChange = 2;
-  NewtonSummary all;
-  const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
-  const bool may_lag = least_motion_ && potential_.has_friction();
-  VectorX best;
-  double least = std::numeric_limits<double>::infinity();
-  for (int on_the_way = 0, at_the_end = 0;;) {
-    bool is_outdated = false;
-    std::function<bool(const VectorX&)> ends_at;
-    if (may_lag && on_the_way < kMostOnTheWay)
-      ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
-        const std::vector<double> now = contact_forces_on_loose_parts(iterate);
-        return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
-      };
-    NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}), ends_at);
-    summary.add_effort(all);
-    all = std::move(summary);
-    if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
-    Lagged next = lagged_;
-    next.friction = potential_.lag_friction(x, workspace_);
-    if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / kChange) return all;
-    lagged_ = std::move(next);
-    ++(is_outdated ? on_the_way : at_the_end);
-    if (!is_outdated) continue;
-    const std::vector<double> forces = contact_forces_on_loose_parts(x);
-    const bool all_touch = std::all_of(forces.begin(), forces.end(), [](double force) { return force > 0; });
-    if (const double residual = residual_of(x, lagged_); all_touch && residual < least) {
-      least = residual;
-      best = x;
+class LaggedSolve {
+ public:
+  LaggedSolve(StepProblem<Dim>& problem, bool must_settle) : problem_(problem), must_settle_(must_settle) {}
+  /// Solves as StepProblem::solve says.
+  NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
+    double lagging_seconds = 0;
+    VectorX step_to_start;
+    {
+      const ScopedTimer timer(lagging_seconds);
+      const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
+      if (potential_.contact())
+        potential_.contact()->predict_motion(surface_.positions(x), surface_.motion(start - x), workspace_);
+      const bool is_first_step = std::isinf(stiffness_.largest);
+      if (adaptive_ && !is_first_step)
+        problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
+      const double motion = relative_motion<Dim>(with_held_at_targets(lagged_x) - base_);
+      problem_.smooth_friction_by(lagged_x == base_ ? std::max(motion, problem_.last_motion_) : motion);
+      lagged_ = potential_.lag(lagged_x, workspace_);
+      // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
+      const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
+      if (expected.size() > 0 && may_move && is_better_start(start, x)) {
+        if (terms_.has_inertia) step_to_start = start - x;
+        x = start;
+      }
     }
-    // A stiff barrier bounces: the last of these iterates may have forces far too large, or none that hold a body.
-    if (on_the_way == kMostOnTheWay && best.size() > 0) {
-      x = best;
-      lagged_.friction = potential_.lag_friction(x, workspace_);
+    NewtonSummary summary = minimize_first(x, std::move(step_to_start));
+    problem_.rounds_ = 1;
+    summary.assembly_seconds += lagging_seconds;
+    const int rounds = most_rounds();
+    const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
+    std::vector<VectorX> previous = {lagged_x};  // newest last
+    VectorX best = x;
+    Lagged best_lagged = lagged_;
+    BarrierStiffness best_stiffness = stiffness_;
+    double least = std::numeric_limits<double>::infinity();
+    int best_round = 0, round = 1;
+    RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
+    std::optional<Lagged> now;  // what is lagged at x, where the last round made it
+    for (; summary.converged() && round < rounds; ++round) {
+      Lagged next_lagged;
+      double norm = 0;
+      {
+        const ScopedTimer timer(summary.assembly_seconds);
+        problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
+        next_lagged = potential_.lag(x, workspace_);
+        norm = residual_of(x, next_lagged);
+      }
+      if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
+                                       : potential_.has_friction() && norm <= tolerance) {
+        end = RoundsEnd::asked;
+        break;
+      }
+      if (norm < least) {
+        least = norm;
+        best = x;
+        best_lagged = lagged_;
+        best_stiffness = stiffness_;
+        best_round = round;
+      } else if (round - best_round >= kPatience) {
+        x = best;
+        lagged_ = best_lagged;
+        if (adaptive_) {
+          stiffness_ = best_stiffness;
+          potential_.contact()->set_stiffness(stiffness_.value);
+        }
+        end = RoundsEnd::stalled;
+        break;
+      }
+      if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal)) {
+        end = *recurred;
+        now = std::move(next_lagged);
+        break;
+      }
+      if (previous.size() == kLongestCycle) previous.erase(previous.begin());
+      previous.push_back(x);
+      lagged_ = std::move(next_lagged);
+      NewtonSummary next = minimize_lagged(x);
+      ++problem_.rounds_;
+      const bool is_fixed_point = next.converged() && next.iterations == 0;
+      next.add_effort(summary);
+      summary = next;
+      if (is_fixed_point) {
+        end = RoundsEnd::settled;
+        break;
+      }
     }
-  }
-}
-
-/// Norm of the gradient at x, with terms as they are lagged, scaled.
-template <int Dim>
-double LaggedSolve<Dim>::residual_of(const VectorX& x, const Lagged& lagged) {
-  VectorX gradient = VectorX::Zero(x.size());
-  EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
-  double squared = 0;
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] != kNone) squared += gradient[i] * gradient[i];
-  return std::sqrt(squared);
-}
-
-/// Norms of the contact forces, scaled.
-template <int Dim>
-std::vector<double> LaggedSolve<Dim>::contact_forces_on_loose_parts(const VectorX& x) {
-  VectorX gradient = VectorX::Zero(x.size());
-  EnergySum sum;
-  potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::contact; });
-  sum.add_gradient(x, gradient, workspace_);
-  std::vector<double> forces;
-  for (const auto& part : least_motion_->parts()) {
-    double squared = 0;
-    for (const int node : part.nodes) squared += gradient.template segment<Dim>(Dim * node).squaredNorm();
-    forces.push_back(std::sqrt(squared));
-  }
-  return forces;
-}
-
-/// Minimises over the increment from the positions at the start of the step.
-template <int Dim>
-NewtonSummary LaggedSolve<Dim>::minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
-                                              const std::function<bool(const VectorX& x)>& ends_at) {
-  VectorX d = problem_.increment_of(x);
-  const VectorX target = held_.target - base_;
-  EnergySum all = sum;
-  if (least_motion_) {
-    all.add(least_motion_);
-    follow_least_motion(sum, d);
-    extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
-      const bool changed = before && before(iterate);
-      follow_least_motion(sum, iterate);
-      return changed;
-    };
-  }
-  enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
-  std::optional<FlightGuard<Dim>> guard;
-  if (!terms_.has_inertia)
-    guard.emplace(base_, dofs_, held_.target,
-                  least_motion_ ? std::span(least_motion_->parts()) : std::span<const LoosePart<Dim>>());
-  extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
-    if (guard && guard->has_flown(d))
-      ended_by = EndedBy::flight;
-    else if (ends_at && ends_at(base_ + d))
-      ended_by = EndedBy::caller;
-    return ended_by == EndedBy::solver && (!before || before(progress));
-  };
-  constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
-  const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
-  CorrectedSystem corrected(problem_.system(), [&](ConstVectorView iterate, const DofMap& dofs) {
-    return least_motion_->rigid_motions(base_ + iterate, dofs);
-  });
-  NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.system();
-  NewtonSummary summary =
-      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
-  x = base_ + d;
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
-  if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
-  problem_.solution_ = {x, std::move(d)};
-  if (ended_by == EndedBy::caller) return summary;
-  if (ended_by == EndedBy::flight) {
-    summary.termination = Termination::no_descent;
-    const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target);
-    summary.message = turn.empty() ? guard->describe(setup_.units) : turn;
+    const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
+    if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
     return summary;
   }
-  return explained(std::move(summary), sum, x);
-}
 
-template <int Dim>
-void LaggedSolve<Dim>::follow_least_motion(const EnergySum& sum, const VectorX& d) {
-  VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
-  EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
-  least_motion_->follow(gradient, sizes, dofs_);
-}
-
-/// How often the step may be solved, each time with what is lagged at the solution before.
-template <int Dim>
-int LaggedSolve<Dim>::most_rounds() const {
-  int rounds = 1;
-  if (potential_.has_friction())
-    rounds = setup_.contact.friction_iterations < 0 ? kMostRounds : setup_.contact.friction_iterations;
-  if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
-    for (const DampingOptions& options : setup_.damping)
-      rounds = std::max(rounds, setup_.lagging_tolerance > 0 ? kMostRounds : options.lagging_rounds);
-  if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
-  return rounds;
-}
-
-/// Loads that depend on the positions and have no potential.
-template <int Dim>
-bool LaggedSolve<Dim>::has_lagged_loads() const {
-  return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
-}
-
-/// Forces on unknowns at x of the terms of which `is_asked(traits)` holds, scaled.
-template <int Dim>
-template <typename F>
-VectorX LaggedSolve<Dim>::forces_of(const VectorX& x, const Lagged& lagged, const F& is_asked) {
-  EnergySum sum;
-  potential_.add_to(sum, lagged, is_asked);
-  VectorX gradient = VectorX::Zero(x.size());
-  sum.add_gradient(x, gradient, workspace_);
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone) gradient[i] = 0;
-  return gradient;
-}
-
-/// By which part of the largest force at a vertex lagged terms change there from `lagged_` to `now`, in the worst case.
-/// Where friction is small beside what it may be, that counts.
-template <int Dim>
-double LaggedSolve<Dim>::largest_change(const VectorX& x, const Lagged& now) {
-  const auto is_lagged = [](const Traits& term) { return term.needs_velocities || term.has_no_potential; };
-  const auto largest = [](const VectorX& force) {
-    return std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff());
-  };
-  const VectorX before = forces_of(x, lagged_, is_lagged), after = forces_of(x, now, is_lagged);
-  double size = std::max(largest(before), largest(after));
-  if (potential_.has_friction())
-    size = std::max(size, setup_.contact.friction_coefficient *
-                              largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
-  return size > 0 ? largest(after - before) / size : 0;
-}
-
-/// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
-/// their forces on unknowns at x.
-template <int Dim>
-template <typename F>
-double LaggedSolve<Dim>::change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
-  const VectorX after = forces_of(x, now, is_asked), before = forces_of(x, lagged_, is_asked);
-  const double size = std::max(after.norm(), before.norm()), change = (after - before).norm();
-  if (!std::isfinite(change)) return std::numeric_limits<double>::infinity();
-  return size > 0 ? change / size : 0;
-}
-
-/// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
-template <int Dim>
-void LaggedSolve<Dim>::judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds,
-                                     NewtonSummary& summary) {
-  if (!now) now = potential_.lag(x, workspace_);
-  const double asked = setup_.lagging_tolerance, change = asked > 0 ? largest_change(x, *now) : 0;
-  if (change > asked) {
-    summary.message = fmt::format(
-        "friction, pressure or damping changes by {:.2g} of the largest force, {} after {} solves; expected at most {:g} "
-        "(/solver/lagging_tolerance)",
-        change, how, rounds, asked);
-    if (must_settle_) {
-      summary.termination = Termination::lagging;
-      return;
-    }
-  }
-  if (has_lagged_loads()) {
-    const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
-    if (off > setup_.lagged_load_tolerance) {
-      summary.termination = Termination::lagging;
-      summary.message = fmt::format(
-          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves; "
-          "expected "
-          "at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the forces, may "
-          "settle "
-          "them",
-          off, how, rounds, setup_.lagged_load_tolerance);
-      return;
-    }
-    if (asked == 0 && off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
-      summary.message = fmt::format(
-          "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves", off,
-          how, rounds);
-  }
-  if (asked > 0 || !lagged_.friction || !now->friction) return;
-  const double off = change_of(x, *now, is_friction);
-  if (off > kFrictionWorthSaying)
-    summary.message += fmt::format(
-        "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
-        "(/solver/contact/friction_iterations)",
-        summary.message.empty() ? "" : "; ", off, how, rounds);
-}
-
-/// x with held dofs at their targets.
-template <int Dim>
-VectorX LaggedSolve<Dim>::with_held_at_targets(VectorX x) const {
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] == kNone) x[i] = held_.target[i];
-  return x;
-}
-
-/// Whether a solve from x had better begin at `start`: the way there is free, and the energy lower than where only what is
-/// held moves.
-template <int Dim>
-bool LaggedSolve<Dim>::is_better_start(const VectorX& start, const VectorX& x) {
-  const EnergySum sum = potential_.sum(lagged_);
-  return sum.max_step(x, start - x, workspace_) == 1 &&
-         sum.value(start, workspace_) < sum.value(with_held_at_targets(x), workspace_);
-}
-
-template <int Dim>
-NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
-  double lagging_seconds = 0;
-  VectorX way_to_start;
-  {
-    const ScopedTimer timer(lagging_seconds);
-    const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
-    if (potential_.contact()) potential_.contact()->foresee(surface_.positions(x), surface_.motion(start - x), workspace_);
-    const bool is_first_step = std::isinf(stiffness_.largest);
-    if (adaptive_ && !is_first_step)
-      problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
-    const double motion = relative_motion<Dim>(with_held_at_targets(lagged_x) - base_);
-    problem_.smooth_friction_by(lagged_x == base_ ? std::max(motion, problem_.last_motion_) : motion);
-    lagged_ = potential_.lag(lagged_x, workspace_);
-    // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
-    const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
-    if (expected.size() > 0 && may_move && is_better_start(start, x)) {
-      if (terms_.has_inertia) way_to_start = start - x;
-      x = start;
-    }
-  }
-  NewtonSummary summary = minimize_first(x, std::move(way_to_start));
-  problem_.rounds_ = 1;
-  summary.assembly_seconds += lagging_seconds;
-  const int rounds = most_rounds();
-  const double tolerance = setup_.contact.friction_tolerance * setup_.time.dt;
-  std::vector<VectorX> previous = {lagged_x};  // newest last
-  VectorX best = x;
-  Lagged best_lagged = lagged_;
-  BarrierStiffness best_stiffness = stiffness_;
-  double least = std::numeric_limits<double>::infinity();
-  int best_round = 0, round = 1;
-  RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
-  std::optional<Lagged> now;  // what is lagged at x, where the last round made it
-  for (; summary.converged() && round < rounds; ++round) {
-    Lagged next_lagged;
-    double norm = 0;
-    {
-      const ScopedTimer timer(summary.assembly_seconds);
-      problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
-      next_lagged = potential_.lag(x, workspace_);
-      norm = residual_of(x, next_lagged);
-    }
-    if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
-                                     : potential_.has_friction() && norm <= tolerance) {
-      end = RoundsEnd::asked;
-      break;
-    }
-    if (norm < least) {
-      least = norm;
-      best = x;
-      best_lagged = lagged_;
-      best_stiffness = stiffness_;
-      best_round = round;
-    } else if (round - best_round >= kPatience) {
-      x = best;
-      lagged_ = best_lagged;
-      if (adaptive_) {
-        stiffness_ = best_stiffness;
-        potential_.contact()->set_stiffness(stiffness_.value);
+ private:
+  using Lagged = typename IncrementalPotential<Dim>::Lagged;
+  using Traits = TermTraits<Dim>;
+  /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will
+  /// hold them, and slide off before the next round unless friction is lagged where contact forces are new: here it is
+  /// lagged again as often as those on a body double or halve on the way, and at the end where friction itself would.
+  NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
+    constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
+    constexpr double kChange = 2;
+    NewtonSummary all;
+    const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
+    const bool may_lag = least_motion_ && potential_.has_friction();
+    VectorX best;
+    double least = std::numeric_limits<double>::infinity();
+    for (int on_the_way = 0, at_the_end = 0;;) {
+      bool is_outdated = false;
+      std::function<bool(const VectorX&)> ends_at;
+      if (may_lag && on_the_way < kMostOnTheWay)
+        ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
+          const std::vector<double> now = contact_forces_on_loose_parts(iterate);
+          return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
+        };
+      NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}), ends_at);
+      summary.add_effort(all);
+      all = std::move(summary);
+      if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
+      Lagged next = lagged_;
+      next.friction = potential_.lag_friction(x, workspace_);
+      if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / kChange) return all;
+      lagged_ = std::move(next);
+      ++(is_outdated ? on_the_way : at_the_end);
+      if (!is_outdated) continue;
+      const std::vector<double> forces = contact_forces_on_loose_parts(x);
+      const bool all_touch = std::all_of(forces.begin(), forces.end(), [](double force) { return force > 0; });
+      if (const double residual = residual_of(x, lagged_); all_touch && residual < least) {
+        least = residual;
+        best = x;
       }
-      end = RoundsEnd::stalled;
-      break;
-    }
-    if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal)) {
-      end = *recurred;
-      now = std::move(next_lagged);
-      break;
-    }
-    if (previous.size() == kLongestCycle) previous.erase(previous.begin());
-    previous.push_back(x);
-    lagged_ = std::move(next_lagged);
-    NewtonSummary next = minimize_lagged(x);
-    ++problem_.rounds_;
-    const bool is_fixed_point = next.converged() && next.iterations == 0;
-    next.add_effort(summary);
-    summary = next;
-    if (is_fixed_point) {
-      end = RoundsEnd::settled;
-      break;
+      // A stiff barrier bounces: the last of these iterates may have forces far too large, or none that hold a body.
+      if (on_the_way == kMostOnTheWay && best.size() > 0) {
+        x = best;
+        lagged_.friction = potential_.lag_friction(x, workspace_);
+      }
     }
   }
-  const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
-  if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
-  return summary;
+  /// Norm of the gradient at x, with terms as they are lagged, scaled.
+  double residual_of(const VectorX& x, const Lagged& lagged) {
+    VectorX gradient = VectorX::Zero(x.size());
+    EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+    double squared = 0;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] != kNone) squared += gradient[i] * gradient[i];
+    return std::sqrt(squared);
+  }
+  /// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms
+  /// before held dofs move: so it is in the regression values of peers' scenes.
+  NewtonSummary minimize_lagged(VectorX& x, VectorX step_to_start = {},
+                                const std::function<bool(const VectorX& x)>& ends_at = {}) {
+    const EnergySum sum = potential_.sum(lagged_);
+    if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
+    NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
+                        .on_iteration = setup_.on_iteration,
+                        .must_be_minimum = !terms_.has_inertia};
+    if (step_to_start.size() > 0) {
+      extras.gradient_of_step = VectorX::Zero(x.size());
+      potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
+      extras.step_to_start = std::move(step_to_start);
+    }
+    if (cells_.has_curved()) {
+      potential_.elastic()->refine_quadrature(x);
+      extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
+    }
+    if (!adaptive_) return minimize_from(x, sum, std::move(extras), ends_at);
+    problem_.initialize_stiffness(x);
+    x = start_of_solve(x);
+    bool is_first = true;
+    extras.after_step = [&](const VectorX& d) {
+      const VectorX iterate = base_ + d;
+      const bool refined = potential_.elastic()->refine_quadrature(iterate);
+      if (std::exchange(is_first, false) || setup_.time.is_static) return refined;
+      const bool changed = adaptive_->update(surface_.positions(iterate), stiffness_, workspace_);
+      if (changed) potential_.contact()->set_stiffness(stiffness_.value);
+      return changed || refined;
+    };
+    return minimize_from(x, sum, std::move(extras), ends_at);
+  }
+  /// Norms of the contact forces, scaled.
+  std::vector<double> contact_forces_on_loose_parts(const VectorX& x) {
+    VectorX gradient = VectorX::Zero(x.size());
+    EnergySum sum;
+    potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::contact; });
+    sum.add_gradient(x, gradient, workspace_);
+    std::vector<double> forces;
+    for (const auto& part : least_motion_->parts()) {
+      double squared = 0;
+      for (const int node : part.nodes) squared += gradient.template segment<Dim>(Dim * node).squaredNorm();
+      forces.push_back(std::sqrt(squared));
+    }
+    return forces;
+  }
+  /// Minimises over the increment from the positions at the start of the step.
+  NewtonSummary minimize_from(VectorX& x, const EnergySum& sum, NewtonExtras extras,
+                              const std::function<bool(const VectorX& x)>& ends_at) {
+    VectorX d = problem_.increment_of(x);
+    const VectorX target = held_.target - base_;
+    EnergySum all = sum;
+    if (least_motion_) {
+      all.add(least_motion_);
+      follow_least_motion(sum, d);
+      extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
+        const bool changed = before && before(iterate);
+        follow_least_motion(sum, iterate);
+        return changed;
+      };
+    }
+    enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
+    std::optional<FlightGuard<Dim>> guard;
+    if (!terms_.has_inertia)
+      guard.emplace(base_, dofs_, held_.target,
+                    least_motion_ ? std::span(least_motion_->parts()) : std::span<const LoosePart<Dim>>());
+    extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
+      if (guard && guard->has_flown(d))
+        ended_by = EndedBy::flight;
+      else if (ends_at && ends_at(base_ + d))
+        ended_by = EndedBy::caller;
+      return ended_by == EndedBy::solver && (!before || before(progress));
+    };
+    constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
+    const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
+    CorrectedSystem corrected(problem_.system(), [&](ConstVectorView iterate, const DofMap& dofs) {
+      return least_motion_->rigid_motions(base_ + iterate, dofs);
+    });
+    NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.system();
+    NewtonSummary summary =
+        minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
+    x = base_ + d;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+    if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
+    problem_.solution_ = {x, std::move(d)};
+    if (ended_by == EndedBy::caller) return summary;
+    if (ended_by == EndedBy::flight) {
+      summary.termination = Termination::no_descent;
+      const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target);
+      summary.message = turn.empty() ? guard->describe(setup_.units) : turn;
+      return summary;
+    }
+    return explained(std::move(summary), sum, x);
+  }
+  void follow_least_motion(const EnergySum& sum, const VectorX& d) {
+    VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
+    EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
+    least_motion_->follow(gradient, sizes, dofs_);
+  }
+  /// `summary` with the reason of a failure.
+  NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
+    if (summary.converged()) return summary;
+    const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
+    if (const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target); !turn.empty())
+      summary.message = turn + "; " + summary.message;
+    summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
+                                      sum, x, workspace_);
+    return summary;
+  }
+  /// x with held dofs at their targets.
+  VectorX with_held_at_targets(VectorX x) const {
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone) x[i] = held_.target[i];
+    return x;
+  }
+  /// Whether a solve from x had better begin at `start`: the way there is free, and the energy lower than where only what is
+  /// held moves.
+  bool is_better_start(const VectorX& start, const VectorX& x) {
+    const EnergySum sum = potential_.sum(lagged_);
+    return sum.max_step(x, start - x, workspace_) == 1 &&
+           sum.value(start, workspace_) < sum.value(with_held_at_targets(x), workspace_);
+  }
+  /// x with held dofs at their targets, where the straight way there is free.
+  VectorX start_of_solve(const VectorX& x) {
+    const VectorX start = with_held_at_targets(x);
+    const bool free = std::isfinite(potential_.elastic()->value(start, workspace_)) &&
+                      (!cells_.has_curved() || potential_.elastic()->max_step(x, start - x, workspace_) == 1) &&
+                      potential_.contact_of_cells()->max_step(x, start - x, workspace_) == 1;
+    return free ? start : x;
+  }
+  /// How often the step may be solved, each time with what is lagged at the solution before.
+  int most_rounds() const {
+    int rounds = 1;
+    if (potential_.has_friction())
+      rounds = setup_.contact.friction_iterations < 0 ? kMostRounds : setup_.contact.friction_iterations;
+    if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
+      for (const DampingOptions& options : setup_.damping)
+        rounds = std::max(rounds, setup_.lagging_tolerance > 0 ? kMostRounds : options.lagging_rounds);
+    if (has_lagged_loads()) rounds = std::max(rounds, kPressureRounds);
+    return rounds;
+  }
+  /// Loads that depend on the positions and have no potential.
+  bool has_lagged_loads() const { return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)); }
+  /// Forces on unknowns at x of the terms of which `is_asked(traits)` holds, scaled.
+  template <typename F>
+  VectorX forces_of(const VectorX& x, const Lagged& lagged, const F& is_asked) {
+    EnergySum sum;
+    potential_.add_to(sum, lagged, is_asked);
+    VectorX gradient = VectorX::Zero(x.size());
+    sum.add_gradient(x, gradient, workspace_);
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone) gradient[i] = 0;
+    return gradient;
+  }
+  /// By which fraction of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`,
+  /// in their forces on unknowns at x.
+  template <typename F>
+  double change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
+    const VectorX after = forces_of(x, now, is_asked), before = forces_of(x, lagged_, is_asked);
+    const double size = std::max(after.norm(), before.norm()), change = (after - before).norm();
+    if (!std::isfinite(change)) return std::numeric_limits<double>::infinity();
+    return size > 0 ? change / size : 0;
+  }
+  /// By which part of the largest force at a vertex lagged terms change there from `lagged_` to `now`, in the worst case.
+  /// Where friction is small beside what it may be, that counts.
+  double largest_change(const VectorX& x, const Lagged& now) {
+    const auto is_lagged = [](const Traits& term) { return term.needs_velocities || term.has_no_potential; };
+    const auto largest = [](const VectorX& force) {
+      return std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff());
+    };
+    const VectorX before = forces_of(x, lagged_, is_lagged), after = forces_of(x, now, is_lagged);
+    double size = std::max(largest(before), largest(after));
+    if (potential_.has_friction())
+      size =
+          std::max(size, setup_.contact.friction_coefficient *
+                             largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
+    return size > 0 ? largest(after - before) / size : 0;
+  }
+  /// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
+  void judge_lagging(const VectorX& x, std::optional<Lagged> now, std::string_view how, int rounds, NewtonSummary& summary) {
+    if (!now) now = potential_.lag(x, workspace_);
+    const double asked = setup_.lagging_tolerance, change = asked > 0 ? largest_change(x, *now) : 0;
+    if (change > asked) {
+      summary.message = fmt::format(
+          "friction, pressure or damping changes by {:.2g} of the largest force, {} after {} solves; expected at most {:g} "
+          "(/solver/lagging_tolerance)",
+          change, how, rounds, asked);
+      if (must_settle_) {
+        summary.termination = Termination::lagging;
+        return;
+      }
+    }
+    if (has_lagged_loads()) {
+      const double off = change_of(x, *now, [](const Traits& term) { return term.has_no_potential; });
+      if (off > setup_.lagged_load_tolerance) {
+        summary.termination = Termination::lagging;
+        summary.message = fmt::format(
+            "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves; "
+            "expected "
+            "at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the forces, "
+            "may "
+            "settle "
+            "them",
+            off, how, rounds, setup_.lagged_load_tolerance);
+        return;
+      }
+      if (asked == 0 && off > kLoadsWorthSaying * setup_.lagged_load_tolerance)
+        summary.message = fmt::format(
+            "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves",
+            off, how, rounds);
+    }
+    if (asked > 0 || !lagged_.friction || !now->friction) return;
+    const double off = change_of(x, *now, is_friction);
+    if (off > kFrictionWorthSaying)
+      summary.message += fmt::format(
+          "{}friction is {:.2g} of itself off that of the contact forces reached, {} after {} solves "
+          "(/solver/contact/friction_iterations)",
+          summary.message.empty() ? "" : "; ", off, how, rounds);
+  }
+
+  StepProblem<Dim>& problem_;
+  bool must_settle_;
+  const StepSetup<Dim>& setup_ = problem_.setup_;
+  const PotentialTerms<Dim>& terms_ = problem_.terms_;
+  const CellSet<Dim>& cells_ = problem_.cells_;
+  const ContactSurface<Dim>& surface_ = problem_.surface_;
+  Workspace& workspace_ = problem_.workspace_;
+  const HeldDofs<Dim>& held_ = problem_.held_;
+  const DofMap& dofs_ = problem_.dofs_;
+  IncrementalPotential<Dim>& potential_ = problem_.potential_;
+  const VectorX& base_ = problem_.base_;
+  const std::shared_ptr<LeastMotion<Dim>>& least_motion_ = problem_.least_motion_;
+  const std::unique_ptr<AdaptiveStiffness<Dim>>& adaptive_ = problem_.adaptive_;
+  BarrierStiffness& stiffness_ = problem_.stiffness_;
+  Lagged& lagged_ = problem_.lagged_;
+  VectorX norm_weights_;  ///< of NewtonNorm, once needed
+};
+
+template <int Dim>
+NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected, bool must_settle) {
+  return LaggedSolve<Dim>(*this, must_settle).solve(x, lagged_x, expected);
 }
 
-template class LaggedSolve<2>;
-template class LaggedSolve<3>;
+#define ITR_INSTANTIATE(Dim) template NewtonSummary StepProblem<Dim>::solve(VectorX&, const VectorX&, const VectorX&, bool);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -157,8 +157,6 @@ MatrixX project_fields(const Mesh<Dim>& before, const Mesh<Dim>& mesh, const Mes
   template MeshChange<Dim> describe_change<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const MeshRenumbering&);       \
   template MatrixX project_fields<Dim>(const Mesh<Dim>&, const Mesh<Dim>&, const MeshChange<Dim>&, const MatrixX&, \
                                        const std::map<int, double>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

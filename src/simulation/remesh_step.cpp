@@ -4,21 +4,79 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/inertia.hpp"
 #include "geometry/bvh.hpp"
 #include "itr/energy.hpp"
+#include "itr/transfer.hpp"
 #include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
-#include "simulation/momentum_change.hpp"
+#include "simulation/moment.hpp"
+#include "simulation/state.hpp"
 #include "time/integrator.hpp"
 
 namespace itr {
 
 namespace {
 
-/// Share of the mass times the size of the bodies that round-off explains: less is not told.
+template <int Dim>
+struct Momentum {
+  Vec<Dim> linear = Vec<Dim>::Zero();
+  Vec<Dim == 2 ? 1 : 3> angular = Vec < Dim == 2 ? 1 : 3 > ::Zero();
+};
+
+/// Momentum by body, of some bodies, whose nodes move with v.
+template <int Dim>
+std::map<int, Momentum<Dim>> momenta_of(const StepSetup<Dim>& setup, const CellSet<Dim>& cells, const std::set<int>& bodies,
+                                        const VectorX& x, const VectorX& v) {
+  std::map<int, Momentum<Dim>> momenta;
+  for (const int body : bodies) momenta[body];
+  const InertiaEnergy<Dim> inertia(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+                                   VectorX::Zero(v.size()));
+  inertia.for_each_mass([&](int body, const auto& nodes, const auto& mass) {
+    const auto found = momenta.find(body);
+    if (found == momenta.end()) return;
+    const auto product = (at_nodes<Dim>(nodes, v) * mass).eval();
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const Vec<Dim> p = product.col(static_cast<Eigen::Index>(k));
+      found->second.linear += p;
+      found->second.angular += moment(Vec<Dim>(x.segment<Dim>(Dim * nodes[k])), p);
+    }
+  });
+  return momenta;
+}
+
+/// Changes by edits, between two states at the start of a step, of the momentum that bodies would have at its end without
+/// forces: for the bodies of `touched`, as an impulse over the step.
+template <int Dim>
+std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const State<Dim>& before, const State<Dim>& after,
+                                             const TouchedCells& touched) {
+  if (!setup.time.has_inertia()) return {};
+  std::set<int> bodies;
+  for (const CellId c : touched.old_cells) bodies.insert(before.mesh.body(c));
+  for (const CellId c : touched.new_cells) bodies.insert(after.mesh.body(c));
+  // The integrator's acceleration from the history is linear in the end velocity, of which none is left here.
+  const auto momenta = [&](const State<Dim>& state) {
+    const Eigen::Index dofs = Eigen::Index{Dim} * state.mesh.num_nodes();
+    const VectorX& x = state.history.x[0];
+    const VectorX free = -setup.time.dt * TimeIntegrator(setup.time).acceleration(VectorX::Zero(x.size()), state.history);
+    return momenta_of<Dim>(setup, whole_mesh(state.mesh, {}), bodies, x.head(dofs), free.head(dofs));
+  };
+  const auto were = momenta(before), are = momenta(after);
+  std::vector<MomentumChange> changes;
+  for (const int body : bodies) {
+    const Vec<Dim> linear = are.at(body).linear - were.at(body).linear;
+    const Vec<Dim == 2 ? 1 : 3> angular = are.at(body).angular - were.at(body).angular;
+    changes.push_back({body, {linear.begin(), linear.end()}, {angular.begin(), angular.end()}});
+  }
+  return changes;
+}
+
+/// Fraction of the mass times the size of the bodies that round-off explains: less is not told.
 constexpr double kLossWorthTelling = 1e-12;
 
 /// The bodies' part of a field over bodies and obstacles.
@@ -140,10 +198,10 @@ RemeshOptions options_of_step(const StepSetup<Dim>& setup, double stored_energy)
   const FollowsStoredEnergy& follows = setup.follows_stored_energy;
   if (!follows.split) return options;
   const double split = *options.split.acceptance_tolerance;
-  const double share = std::clamp(kStoredShare * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
-  options.split.acceptance_tolerance = share * split;
-  const auto scale = [share](std::optional<double>& tolerance, bool follows_too) {
-    if (follows_too) tolerance = share * *tolerance;
+  const double fraction = std::clamp(kStoredFraction * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
+  options.split.acceptance_tolerance = fraction * split;
+  const auto scale = [fraction](std::optional<double>& tolerance, bool follows_too) {
+    if (follows_too) tolerance = fraction * *tolerance;
   };
   scale(options.collapse.acceptance_tolerance, follows.collapse);
   scale(options.swap.acceptance_tolerance, follows.swap);
@@ -283,8 +341,6 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
                                                                  VectorX&, StepReport&);                                   \
   template std::optional<MeshRenumbering> straighten_and_project<Dim>(                                                     \
       const StepTools<Dim>&, std::span<const CellId>, double, const State<Dim>&, State<Dim>&, VectorX&, StepReport&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

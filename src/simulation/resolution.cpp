@@ -44,8 +44,7 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   for (const auto& condition : setup.dirichlet)
     for (VertexId v = 0; v < mesh.node_slots(); ++v)
       if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     const RestPoint<Dim> X = mesh.point(mesh.facet(f)[0]);
     for (const auto& condition : setup.dirichlet)
       if (condition.tag == mesh.facet_tag(f)) add_held(X, condition);
@@ -70,8 +69,7 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   const TimeOptions& time = setup.time;
   const History& history = simulation.state().history;
   Actions actions, first;
-  const bool has_inertia = !time.quasistatic && !time.is_static;
-  if (has_inertia && !history.v.empty() && history.v[0].size() > 0)
+  if (time.has_inertia() && !history.v.empty() && history.v[0].size() > 0)
     actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
   add_loads(setup, time.time_after(time.first_step + 1), actions);
   first = actions;
@@ -91,7 +89,7 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
     const double at_rest =
         (first.traction + material.density * first.acceleration * length) / material.youngs_modulus * length;
     const double in_flight = time.dt * time.dt * (first.acceleration + first.traction / (material.density * length));
-    if (!has_inertia)
+    if (!time.has_inertia())
       motion = std::max(motion, at_rest);
     else
       motion =

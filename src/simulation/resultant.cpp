@@ -30,11 +30,11 @@ std::vector<char> nodes_of(const State<Dim>& state, std::span<const int> surface
   const auto has = [](std::span<const int> list, int id) { return std::find(list.begin(), list.end(), id) != list.end(); };
   const auto take = [&](const auto& simplex) { for_each_node(mesh, simplex, [&](int node) { is_on[node] = 1; }); };
   if (!surfaces.empty())
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.is_facet_alive(f) && has(surfaces, mesh.facet_tag(f))) take(mesh.facet(f));
+    for (const FacetId f : mesh.live_facets())
+      if (has(surfaces, mesh.facet_tag(f))) take(mesh.facet(f));
   if (!bodies.empty())
-    for (CellId c = 0; c < mesh.cell_slots(); ++c)
-      if (mesh.is_cell_alive(c) && has(bodies, mesh.body(c))) take(mesh.cell(c));
+    for (const CellId c : mesh.live_cells())
+      if (has(bodies, mesh.body(c))) take(mesh.cell(c));
   return is_on;
 }
 
@@ -54,10 +54,9 @@ void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_
   if (target.surfaces.empty() && target.bodies.empty() && target.obstacle_vertices.empty())
     throw InputError({"", place, "no surfaces, bodies or obstacles", "at least one of them"});
   std::set<int> surfaces, bodies;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-    if (mesh.is_facet_alive(f) && mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
-  for (CellId c = 0; c < mesh.cell_slots(); ++c)
-    if (mesh.is_cell_alive(c)) bodies.insert(mesh.body(c));
+  for (const FacetId f : mesh.live_facets())
+    if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
+  for (const CellId c : mesh.live_cells()) bodies.insert(mesh.body(c));
   refuse_unknown_ids(target.surfaces, surfaces, place, "the id of a surface");
   refuse_unknown_ids(target.bodies, bodies, place, "the id of a body");
   for (const int v : target.obstacle_vertices)
@@ -78,8 +77,8 @@ template <int Dim>
 ForceSums<Dim> sum_forces(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const std::array<const VectorX*, 4> kinds{&forces.contact, &forces.friction, &forces.reaction, &forces.applied};
   const int bodies = state.mesh.num_nodes();
-  for (const VectorX* kind : {kinds[0], kinds[1], kinds[2], kinds[3], &forces.body, &forces.residual})
-    if (kind->size() != Eigen::Index{Dim} * bodies)
+  for (const auto kind : kForcesOnBodies)
+    if ((forces.*kind).size() != Eigen::Index{Dim} * bodies)
       throw InputError({"", "fields", "not all kinds of forces",
                         "contact_forces, friction_forces, reaction_forces and applied_forces for a resultant"});
   const VectorX& x = state.history.x[0];
@@ -129,8 +128,6 @@ Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int>
   template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&);    \
   template ForceSums<Dim> sum_forces<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);       \
   template ForceSums<Dim> force_sums<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

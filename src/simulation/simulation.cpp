@@ -12,12 +12,12 @@
 
 #include "core/process.hpp"
 #include "incoming_state.hpp"
-#include "initial_acceleration.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/frame_data.hpp"
 #include "simulation/step.hpp"
+#include "simulation/step_problem.hpp"
 #include "unsupported.hpp"
 #include "watch.hpp"
 
@@ -132,8 +132,7 @@ struct Simulation<Dim>::Impl {
   /// Where nodes are now, where they fly, and where they are held at the end of the step.
   std::vector<VectorX> places_of_step(const State<Dim>& before) const {
     std::vector<VectorX> places = {before.history.x[0]};
-    if (!setup.time.is_static && !setup.time.quasistatic)
-      places.push_back(TimeIntegrator(setup.time).predictor(before.history));
+    if (setup.time.has_inertia()) places.push_back(TimeIntegrator(setup.time).predictor(before.history));
     const HeldDofs<Dim> held = held_dofs(setup, before.mesh, setup.time.time_after(before.step + 1));
     VectorX target = before.history.x[0];
     for (Eigen::Index i = 0; i < target.size(); ++i)
@@ -431,10 +430,11 @@ void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
                               const std::function<void(const FrameView<Dim>&)>& observer) const {
   const Setup<Dim>& setup = impl_->setup;
   const FrameData<Dim> data = frame_data(setup, *snapshot.state, snapshot.forces);
-  FrameView<Dim> frame{snapshot.state->mesh,  data.x, data.v, data.elastic_density, data.obstacle_x,
-                       setup.obstacles.edges, setup.obstacles.triangles, &data.asked};
+  FrameView<Dim> frame{snapshot.state->mesh,      data.x,          data.v,
+                       data.elastic_density,      data.obstacle_x, setup.obstacles.edges,
+                       setup.obstacles.triangles, &data.asked};
   frame.names = &setup.names;
-  frame.dhat = setup.contact.activation_distance;
+  frame.dhat = setup.contact.dhat;
   if (setup.proxy) frame.proxy = {&data.proxy_x, &setup.proxy->edges, &setup.proxy->triangles};
   observer(frame);
 }

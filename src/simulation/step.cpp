@@ -20,12 +20,55 @@
 #include "newton/round_off.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
-#include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/stability.hpp"
 
 namespace itr {
+
+namespace {
+
+/// Holds the steps of the trapezoidal rule to TimeOptions::energy_growth_limit, and keeps the balance of what they create
+/// (State::created_energy). Work of loads, held vertices and obstacles is not created: it adds to the energy that the limit
+/// is a part of.
+template <int Dim>
+class EnergyGuard {
+ public:
+  /// Guards a step that starts from `start`. `setup` must outlive this.
+  EnergyGuard(const StepSetup<Dim>& setup, const State<Dim>& start)
+      : setup_(setup),
+        is_on_(std::isfinite(setup.time.energy_growth_limit) && setup.time.integrator == Integrator::newmark),
+        start_(start.created_energy),
+        balance_(start.created_energy) {}
+  /// Whether the step from `history`, which `problem` describes, may end at x. Always, where implicit Euler takes it.
+  bool allows(StepProblem<Dim>& problem, const History& history, const VectorX& x) {
+    const TimeIntegrator integrator(setup_.time);
+    const bool is_trapezoidal = integrator.is_trapezoidal(history);
+    if (!is_on_ || !(is_trapezoidal || history.damp_next)) return true;
+    const double created = problem.created_energy(history, x);
+    const double before = problem.mechanical_energy(history.x[0], history.v[0]);
+    // With the work that was done on the bodies, without what the step created.
+    const double after = std::max(0.0, problem.mechanical_energy(x, integrator.velocity(x, history)) - created);
+    // Energy that is dissipated or flows off takes along its fraction of what was created before.
+    balance_ = created + start_ * (before > 0 ? std::min(1.0, after / before) : 1);
+    if (!is_trapezoidal) {
+      balance_ = std::max(0.0, balance_);  // what implicit Euler dissipates is no credit for later steps
+      return true;
+    }
+    const double resolution = problem.energy_resolution();
+    return created <= resolution || balance_ <= setup_.time.energy_growth_limit * (std::max(before, after) + resolution);
+  }
+  /// The balance at the end of the step that was last asked about [J].
+  double created_energy() const { return balance_; }
+
+ private:
+  const StepSetup<Dim>& setup_;
+  bool is_on_;
+  double start_;    ///< the balance before the step [J]
+  double balance_;  ///< and at its end [J]
+};
+
+}  // namespace
 
 template <int Dim>
 EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
@@ -187,7 +230,7 @@ class StepSolver {
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
     if (setup_.contact.enabled) tell_of_closed_faces();
-    if (has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
+    if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
     if (setup_.contact.enabled) open_faces(setup_, next_.chords, next_.history.x[0], next_.mesh);
@@ -340,11 +383,9 @@ class StepSolver {
         setup_.units.text(depth, "m", 3)));
   }
 
-  bool has_inertia() const { return !setup_.time.quasistatic && !setup_.time.is_static; }
-
   /// Where forces that act as in the last step lead to; empty without inertia.
   VectorX expected() const {
-    if (!has_inertia()) return {};
+    if (!setup_.time.has_inertia()) return {};
     VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
     if (next_.deviation.size() == x.size()) x += next_.deviation;
     return x;
@@ -400,8 +441,9 @@ class StepSolver {
 
   /// Whether edges become curved where straight ones keep up what would buckle.
   bool may_curve_for_stability() const {
-    return !has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled && !setup_.lump_mass &&
-           setup_.terms.empty() && !setup_.follower.forces && setup_.newton.indefinite == IndefiniteHessian::project;
+    return !setup_.time.has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled &&
+           !setup_.lump_mass && setup_.terms.empty() && !setup_.follower.forces &&
+           setup_.newton.indefinite == IndefiniteHessian::project;
   }
 
   /// Curves edges and solves again as long as the solution is stable only because edges are straight. The last solve, if it
@@ -568,8 +610,6 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
 #define ITR_INSTANTIATE(Dim)                                \
   template EdgeLengths edge_lengths<Dim>(const Mesh<Dim>&); \
   template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, State<Dim>*, Attempt);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -49,21 +48,15 @@ void add_half(const NodalForces& forces, const State<Dim>& of, const State<Dim>&
   const bool same = of.mesh.num_vertices() == now.mesh.num_vertices() && of.mesh.rest() == now.mesh.rest() &&
                     of.mesh.curved_edges() == now.mesh.curved_edges();
   const Eigen::SparseMatrix<double> weights = same ? Eigen::SparseMatrix<double>() : weights_between(of, now);
-  const auto add = [&](const VectorX& field, VectorX& to) {
-    if (field.size() == 0) return;
+  for (const auto kind : kForcesOnBodies) {
+    const VectorX& field = forces.*kind;
+    if (field.size() == 0) continue;
     if (same)
-      to += field / 2;
+      sum.*kind += field / 2;
     else
-      to.reshaped(Dim, weights.rows()) += 0.5 * field.reshaped(Dim, weights.cols()) * weights.transpose();
-  };
-  add(forces.contact, sum.contact);
-  add(forces.friction, sum.friction);
-  add(forces.reaction, sum.reaction);
-  add(forces.applied, sum.applied);
-  add(forces.body, sum.body);
-  add(forces.residual, sum.residual);
-  sum.obstacle_contact += forces.obstacle_contact / 2;
-  sum.obstacle_friction += forces.obstacle_friction / 2;
+      (sum.*kind).reshaped(Dim, weights.rows()) += 0.5 * field.reshaped(Dim, weights.cols()) * weights.transpose();
+  }
+  for (const auto kind : kForcesOnObstacles) sum.*kind += forces.*kind / 2;
 }
 
 /// Forces of two halves of a step: of their impulses over the whole. Without inertia there are none, and those at the end
@@ -71,11 +64,10 @@ void add_half(const NodalForces& forces, const State<Dim>& of, const State<Dim>&
 template <int Dim>
 NodalForces mean_forces(const StepSetup<Dim>& setup, const NodalForces& first, const State<Dim>& middle,
                         const NodalForces& second, const State<Dim>& end) {
-  if (setup.time.quasistatic || setup.time.is_static) return second;
+  if (!setup.time.has_inertia()) return second;
   NodalForces mean = second;
-  for (VectorX* field : {&mean.contact, &mean.friction, &mean.reaction, &mean.applied, &mean.body, &mean.residual,
-                         &mean.obstacle_contact, &mean.obstacle_friction})
-    *field /= 2;
+  for (const auto kind : kForcesOnBodies) mean.*kind /= 2;
+  for (const auto kind : kForcesOnObstacles) mean.*kind /= 2;
   add_half(first, middle, end, mean);
   return mean;
 }

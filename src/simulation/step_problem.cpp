@@ -4,19 +4,44 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <optional>
+#include <span>
 #include <utility>
 
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
 #include "geometry/quadratic_validity.hpp"
 #include "itr/core.hpp"
-#include "lagged_solve.hpp"
 #include "newton/curvature.hpp"
 
 namespace itr {
+
+template <int Dim>
+MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& chords)
+    : mesh_revision(mesh.revision()),
+      chords(chords),
+      cells(whole_mesh(mesh, setup.obstacles.rest)),
+      diagonal(rest_diagonal(mesh)) {
+  if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
+}
+
+template <int Dim>
+bool MeshScope<Dim>::is_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& asked_chords) const {
+  return mesh_revision == mesh.revision() && chords == asked_chords &&
+         std::ranges::equal(setup.obstacles.rest, std::span(cells.rest).subspan(mesh.num_nodes()));
+}
+
+template <int Dim>
+std::shared_ptr<MeshScope<Dim>> ProblemCache<Dim>::scope_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
+                                                            const ChordLevels& chords) {
+  if (!scope || !scope->is_of(setup, mesh, chords)) scope = std::make_shared<MeshScope<Dim>>(setup, mesh, chords);
+  return scope;
+}
+
+template struct MeshScope<2>;
+template struct MeshScope<3>;
+template struct ProblemCache<2>;
+template struct ProblemCache<3>;
 
 namespace {
 
@@ -106,19 +131,14 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   potential_.contact()->set_stiffness(stiffness_.value);
 }
 
-template <int Dim>
-NewtonSummary StepProblem<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected, bool must_settle) {
-  return LaggedSolve<Dim>(*this, must_settle).solve(x, lagged_x, expected);
-}
-
 /// Where the scene leaves it open, friction is smoothed below a part of the relative motion in the step [m]: bodies that
 /// stick then creep by as much of the whole path, in any number of steps and in any unit of time.
 template <int Dim>
 void StepProblem<Dim>::smooth_friction_by(double motion) {
-  constexpr double kShare = 1e-3;
+  constexpr double kFraction = 1e-3;
   constexpr double kLeast = 1e-6;  // of the bodies' diagonal: less is no motion
   if (setup_.contact.friction_velocity == 0)
-    terms_.contact.friction_velocity = kShare * std::max(motion, kLeast * scope_->diagonal) * terms_.velocity_rate;
+    terms_.contact.friction_velocity = kFraction * std::max(motion, kLeast * scope_->diagonal) * terms_.velocity_rate;
 }
 
 template <int Dim>
@@ -296,8 +316,6 @@ double min_volume_ratio(const CellSet<Dim>& cells, ConstVectorView x) {
 #define ITR_INSTANTIATE(Dim)       \
   template class StepProblem<Dim>; \
   template double min_volume_ratio<Dim>(const CellSet<Dim>&, ConstVectorView);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

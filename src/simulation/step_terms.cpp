@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "itr/core.hpp"
@@ -22,9 +21,8 @@ Value finite(const Value& value, const char* what, const Vec<Dim>& X, double t) 
   else
     is_finite = value.allFinite();
   if (is_finite) return value;
-  std::string place;
-  for (int c = 0; c < Dim; ++c) place += fmt::format("{}{:g}", c ? ", " : "", X[c]);
-  throw InputError({"", what, fmt::format("no finite value at X = ({}) m, t = {:g} s", place, t), "a value there"});
+  throw InputError(
+      {"", what, fmt::format("no finite value at X = ({:g}) m, t = {:g} s", fmt::join(X, ", "), t), "a value there"});
 }
 
 }  // namespace
@@ -113,7 +111,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   const TimeIntegrator integrator(setup.time);
   return {.materials = setup.materials,
           .loads = loads_at(setup, t),
-          .has_inertia = !setup.time.quasistatic && !setup.time.is_static,
+          .has_inertia = setup.time.has_inertia(),
           .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
           .quadrature_degree = setup.quadrature_degree,
           .scaling = integrator.scaling(history),
@@ -133,8 +131,6 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
   template double relative_motion<Dim>(const VectorX&);                                             \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -2,7 +2,6 @@
 #include "unsupported.hpp"
 
 #include <algorithm>
-#include <string>
 
 #include "itr/core.hpp"
 

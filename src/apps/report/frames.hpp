@@ -4,8 +4,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
-#include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>

@@ -152,8 +152,6 @@ std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& su
   template std::shared_ptr<const CollisionSurface> collision_surface<Dim>(                                                \
       std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, std::span<const int>, std::span<const Vec<Dim>>,  \
       std::vector<char>);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

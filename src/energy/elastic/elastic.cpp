@@ -18,10 +18,9 @@ namespace itr {
 namespace {
 
 constexpr std::size_t kBlock = 256;
-constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
 
 struct PositionScratch {
-  KeptVector x;
+  ScratchVector x;
 };
 
 template <int Dim>

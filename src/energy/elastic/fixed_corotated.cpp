@@ -64,8 +64,6 @@ InvariantDerivatives fixed_corotated_derivatives(const Vec<Dim>& s, const LamePa
   template double fixed_corotated_density<Dim>(const Mat<Dim>&, const LameParameters&);  \
   template Mat<Dim> fixed_corotated_stress<Dim>(const Mat<Dim>&, const LameParameters&); \
   template InvariantDerivatives fixed_corotated_derivatives<Dim>(const Vec<Dim>&, const LameParameters&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

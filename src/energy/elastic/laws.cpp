@@ -154,8 +154,6 @@ EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& mod
   template double elastic_density<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&);  \
   template Mat<Dim> elastic_stress<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&); \
   template EigenSystem<Dim> elastic_eigensystem<Dim>(const Mat<Dim>&, const ElasticModuli&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -110,8 +110,6 @@ InvariantDerivatives mooney_rivlin_derivatives(const Vec<Dim>& s, const MooneyRi
   template double mooney_rivlin_density<Dim>(const Mat<Dim>&, const MooneyRivlinModuli&);  \
   template Mat<Dim> mooney_rivlin_stress<Dim>(const Mat<Dim>&, const MooneyRivlinModuli&); \
   template InvariantDerivatives mooney_rivlin_derivatives<Dim>(const Vec<Dim>&, const MooneyRivlinModuli&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

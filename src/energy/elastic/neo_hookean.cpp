@@ -97,8 +97,6 @@ NegativeModes<Dim> neo_hookean_negative_modes(const Mat<Dim>& F, const LameParam
   template Mat<Dim> neo_hookean_stress<Dim>(const Mat<Dim>&, const LameParameters&);              \
   template EigenSystem<Dim> neo_hookean_eigensystem<Dim>(const Mat<Dim>&, const LameParameters&); \
   template NegativeModes<Dim> neo_hookean_negative_modes<Dim>(const Mat<Dim>&, const LameParameters&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

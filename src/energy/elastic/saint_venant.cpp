@@ -31,8 +31,6 @@ InvariantDerivatives saint_venant_derivatives(const Vec<Dim>& s, const LameParam
   template double saint_venant_density<Dim>(const Mat<Dim>&, const LameParameters&);  \
   template Mat<Dim> saint_venant_stress<Dim>(const Mat<Dim>&, const LameParameters&); \
   template InvariantDerivatives saint_venant_derivatives<Dim>(const Vec<Dim>&, const LameParameters&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -10,7 +10,7 @@ namespace {
 
 /// How far vertices may move, at least: in longest edges of what moves, and in activation distances.
 constexpr double kRoomInEdges = 0.1, kRoomInDistances = 2;
-/// Share of the room that is enough where contact can be left out.
+/// Fraction of the room that is enough where contact can be left out.
 constexpr double kLeastRoom = 0.25;
 
 template <int Dim>
@@ -27,8 +27,7 @@ double room_for(double longest, double dhat) { return std::max(kRoomInDistances 
 template <int Dim>
 double span_of_clearances(const Mesh<Dim>& mesh, const VectorX& x, double dhat) {
   double squared = 0;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     const auto& facet = mesh.facet(f);
     for (int k = 0; k < Dim; ++k)
       squared =
@@ -127,11 +126,10 @@ void ContactReach<Dim>::sort() {
   touching_.erase(std::unique(touching_.begin(), touching_.end()), touching_.end());
 }
 
-template double span_of_clearances(const Mesh<2>&, const VectorX&, double);
-template double span_of_clearances(const Mesh<3>&, const VectorX&, double);
-template class Neighbourhoods<2>;
-template class Neighbourhoods<3>;
-template class ContactReach<2>;
-template class ContactReach<3>;
+#define ITR_INSTANTIATE(Dim)                                                    \
+  template double span_of_clearances(const Mesh<Dim>&, const VectorX&, double); \
+  template class Neighbourhoods<Dim>;                                           \
+  template class ContactReach<Dim>;
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

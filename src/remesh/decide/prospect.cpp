@@ -18,8 +18,7 @@ template <int Dim>
 std::optional<Vec<Dim>> uniform_acceleration(const Mesh<Dim>& mesh, const Loads<Dim>& loads) {
   std::optional<Vec<Dim>> all;
   if (!loads.acceleration) return Vec<Dim>::Zero();
-  for (VertexId v = 0; v < mesh.node_slots(); ++v) {
-    if (!mesh.is_vertex_alive(v)) continue;
+  for (const VertexId v : mesh.live_vertices()) {
     const Vec<Dim> own = loads.acceleration(mesh.point(v));
     if (all && *all != own) return std::nullopt;
     all = own;
@@ -45,11 +44,10 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   PotentialTerms<Dim> terms = context;
   terms.loads = {};                                                 // they complete squares
   std::vector<double> energy(mesh.node_slots(), context.coupling);  // by part
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     PlacedCell<Dim> cell = place(mesh, fields, terms, cell_before(mesh, c), no_edit<Dim>());
     if (!fields.levels.empty()) cell.level = fields.levels[c];
-    cell.way.colwise() -= fall;
+    cell.step.colwise() -= fall;
     CellModel<Dim> model(terms, mesh.part(c));
     model.add(cell, mesh.body(c));
     energy[mesh.part(c)] += model.energy();
@@ -71,8 +69,8 @@ bool is_small(const Mesh<Dim>& mesh, CellId cell, double longest) {
 template <int Dim>
 bool any_may_collapse(const Mesh<Dim>& mesh, const CollapseOptions& options, const StepContext<Dim>& context) {
   const double longest = longest_collapse(options, context);
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c) || !is_small(mesh, c, longest)) continue;
+  for (const CellId c : mesh.live_cells()) {
+    if (!is_small(mesh, c, longest)) continue;
     for (int i = 0; i <= Dim; ++i)
       for (int j = i + 1; j <= Dim; ++j)
         if ((mesh.rest(mesh.cell(c)[i]) - mesh.rest(mesh.cell(c)[j])).norm() <= longest) return true;
@@ -85,8 +83,6 @@ bool any_may_collapse(const Mesh<Dim>& mesh, const CollapseOptions& options, con
   template double longest_collapse<Dim>(const CollapseOptions&, const StepContext<Dim>&);                     \
   template bool is_small<Dim>(const Mesh<Dim>&, CellId, double);                                              \
   template bool any_may_collapse<Dim>(const Mesh<Dim>&, const CollapseOptions&, const StepContext<Dim>&);
-ITR_INSTANTIATE(2)
-ITR_INSTANTIATE(3)
-#undef ITR_INSTANTIATE
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

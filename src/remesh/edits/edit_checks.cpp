@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "edit_checks.hpp"
 
-#include <cmath>
-
 namespace itr {
 
 std::string_view name(Refusal refusal) {

@@ -132,15 +132,12 @@ Edit<Dim> make_chords(const Mesh<Dim>& mesh, const EdgeKey& edge) {
   return edit;
 }
 
-template Edit<2> make_split<2>(const Mesh<2>&, const EdgeKey&);
-template Edit<3> make_split<3>(const Mesh<3>&, const EdgeKey&);
-template int nodes_of_split<2>(const Mesh<2>&, const EdgeKey&);
-template int nodes_of_split<3>(const Mesh<3>&, const EdgeKey&);
-template Edit<2> make_curve<2>(const Mesh<2>&, const EdgeKey&);
-template Edit<3> make_curve<3>(const Mesh<3>&, const EdgeKey&);
-template Edit<2> make_straighten<2>(const Mesh<2>&, const EdgeKey&);
-template Edit<3> make_straighten<3>(const Mesh<3>&, const EdgeKey&);
-template Edit<2> make_chords<2>(const Mesh<2>&, const EdgeKey&);
-template Edit<3> make_chords<3>(const Mesh<3>&, const EdgeKey&);
+#define ITR_INSTANTIATE(Dim)                                                 \
+  template Edit<Dim> make_split<Dim>(const Mesh<Dim>&, const EdgeKey&);      \
+  template int nodes_of_split<Dim>(const Mesh<Dim>&, const EdgeKey&);        \
+  template Edit<Dim> make_curve<Dim>(const Mesh<Dim>&, const EdgeKey&);      \
+  template Edit<Dim> make_straighten<Dim>(const Mesh<Dim>&, const EdgeKey&); \
+  template Edit<Dim> make_chords<Dim>(const Mesh<Dim>&, const EdgeKey&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

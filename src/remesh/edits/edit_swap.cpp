@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
 
 #include "edit_checks.hpp"
 #include "mesh/edge_ring.hpp"

@@ -2,7 +2,6 @@
 // Vertices of the rest shape move where the energy falls by it (r-adaptation, along the configurational force), and where
 // cells are badly shaped.
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -73,8 +72,8 @@ void run_moves(RemeshSession<Dim>& session, Operation<Dim>& move, double same) {
   move.local.rings = 1;
   move.list = [&] {
     std::vector<Candidate> found;
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.is_vertex_alive(v) && !mesh.is_boundary(v)) found.emplace_back(move.kind, v);
+    for (const VertexId v : mesh.live_vertices())
+      if (!mesh.is_boundary(v)) found.emplace_back(move.kind, v);
     return found;
   };
   move.is_candidate = [](const EdgeKey&) { return false; };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Swaps. Only one that betters the shape may cost a little energy: without that condition, edges swap to and fro.
 #include <algorithm>
-#include <span>
 #include <unordered_map>
 
 #include "remesh/edits/edit_checks.hpp"

@@ -16,8 +16,7 @@ namespace {
 template <int Dim>
 std::vector<double> cell_energies(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   std::vector<double> energies(mesh.cell_slots(), 0);
-  for (int c = 0; c < mesh.cell_slots(); ++c) {
-    if (!mesh.is_cell_alive(c)) continue;
+  for (const CellId c : mesh.live_cells()) {
     const Material& material = context.materials.at(mesh.body(c));
     const auto moduli = elastic_moduli<Dim>(material, mesh.barycenter(c));
     const auto element = element_of(mesh, c);
@@ -37,8 +36,7 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<double> energies(total, 0);
   if (!context.contact.enabled) return energies;
   std::vector<typename MeshTypes<Dim>::Facet> chords;
-  for (int f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets()) {
     for_each_chord<Dim>(mesh.facet(f), nodes_of_edges(mesh), [&](const auto& chord) { chords.push_back(chord); });
   }
   VectorX x(Dim * total);
@@ -47,8 +45,8 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<Vec<Dim>> rest = mesh.rest();
   CollisionSurface surface = surface_of_facets<Dim>(chords, rest, obstacles);
   rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
-  surface.closed = closed_faces<Dim>(rest, context.contact.activation_distance, 0,
-                                     [&](int v) { return v < bodies && mesh.steps_apart(v) == 0; });
+  surface.closed =
+      closed_faces<Dim>(rest, context.contact.dhat, 0, [&](int v) { return v < bodies && mesh.steps_apart(v) == 0; });
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {

@@ -5,7 +5,6 @@
 // 1 are split, largest first; then edges collapse, shortest first, where no edge becomes larger than 0.8.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "geometry/distance.hpp"
 #include "remesh/edits/edit_checks.hpp"
@@ -75,8 +74,7 @@ class SizingField {
   /// No edge is split that is shorter [m].
   double least_length() const {
     Box<Dim> box;
-    for (VertexId v = 0; v < queries_.mesh().node_slots(); ++v)
-      if (queries_.mesh().is_vertex_alive(v)) box.include(queries_.mesh().rest(v));
+    for (const VertexId v : queries_.mesh().live_vertices()) box.include(queries_.mesh().rest(v));
     return queries_.options().sizing_field.rel_min_edge_length * (box.max - box.min).maxCoeff();
   }
 
@@ -110,7 +108,7 @@ class SizingField {
   /// At a vertex of the surface: the unit direction to what is nearest of all that its facets are in contact with, over the
   /// distance [1/m]; zero without contact.
   Vec<Dim> contact_at(VertexId vertex) {
-    const double dhat = queries_.context().contact.activation_distance;
+    const double dhat = queries_.context().contact.dhat;
     double least = dhat * dhat;
     Vec<Dim> direction = Vec<Dim>::Zero();
     const auto look_at = [&](const auto& point, int k, const auto& facet) {
@@ -154,7 +152,7 @@ class SizingField {
   /// Finds the pieces that are nearer than dhat to a facet of the surface at present.
   std::vector<Piece> pieces_in_contact(FacetId f) {
     const SurfaceIndex<Dim>& surface = queries_.surface();
-    const double dhat = queries_.context().contact.activation_distance;
+    const double dhat = queries_.context().contact.dhat;
     LocalScratch<Dim>& scratch = session_.scratch();
     std::vector<Piece> pieces;
     for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "change_log.hpp"
 
-#include <algorithm>
 #include <numeric>
 
 #include "remesh/curved_cell.hpp"
