@@ -15,6 +15,14 @@ namespace itr {
 
 namespace {
 
+std::span<const int> vertices_of(const ContactStencil& stencil) {
+  return {stencil.vertices.data(), static_cast<std::size_t>(stencil.size())};
+}
+
+bool has(std::span<const int> vertices, int vertex) {
+  return std::find(vertices.begin(), vertices.end(), vertex) != vertices.end();
+}
+
 template <int Dim>
 Vec<Dim> middle_of(std::span<const int> vertices, const VectorX& x) {
   Vec<Dim> middle = Vec<Dim>::Zero();
@@ -153,14 +161,6 @@ class Diagnosis {
   Workspace& workspace_;
   std::ostringstream text_;
 };
-
-std::span<const int> vertices_of(const ContactStencil& stencil) {
-  return {stencil.vertices.data(), static_cast<std::size_t>(stencil.size())};
-}
-
-bool has(std::span<const int> vertices, int vertex) {
-  return std::find(vertices.begin(), vertices.end(), vertex) != vertices.end();
-}
 
 }  // namespace
 
