@@ -51,7 +51,7 @@ class VolumeBarrier final : public Energy {
     }
   }
   /// The part of the Hessian along dJ/dx; the part with the curvature of J itself is left out: it is not positive.
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override {
+  void add_hessian(ConstVectorView x, PsdProjection, HessianSink& sink, Workspace&) const override {
     for (const auto& element : cells_.straight()) {
       const Mat<Dim> F = deformation_gradient<Dim>(element, x);
       const double J = F.determinant(), r = J / activation_;
