@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "itr/mesh/strata.hpp"
-#include "itr/remesh/fields.hpp"
+#include "mesh/strata.hpp"
+#include "remesh/fields.hpp"
 
 namespace itr {
 

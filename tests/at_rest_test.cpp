@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "random_tets.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation_scenes.hpp"

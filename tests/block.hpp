@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

@@ -2,9 +2,14 @@
 // The C interface: arrays in, steps, arrays out, statuses and messages instead of exceptions.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -224,6 +229,122 @@ TEST(CInterface, CancelsSavesAndRestores) {
   ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS);
   EXPECT_EQ(itr_positions(block.simulation)[1], y);
   itr_snapshot_destroy(saved);
+}
+
+template <typename Get>
+std::vector<int> ints(itr_simulation* simulation, const Get& get, size_t length) {
+  std::vector<int> values(length);
+  EXPECT_EQ(get(simulation, length, values.data()), ITR_SUCCESS) << itr_simulation_message(simulation);
+  return values;
+}
+template <typename Get>
+std::vector<double> doubles(itr_simulation* simulation, const Get& get, size_t length) {
+  std::vector<double> values(length);
+  EXPECT_EQ(get(simulation, length, values.data()), ITR_SUCCESS) << itr_simulation_message(simulation);
+  return values;
+}
+
+/// A pulled quadratic triangle, in C and by the facade.
+TEST(CInterface, GivesMeshAndStressOfTheFacade) {
+  const std::array nodes{0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5};
+  const std::array cell{0, 1, 2, 3, 4, 5}, bodies{7}, left{0, 2};
+  Model facade_model(2);
+  facade_model.set_quadratic_mesh(nodes, cell, bodies);
+  facade_model.add_boundary("left", left);
+  facade_model.set_options(kOptions);
+  facade_model.set_option("/time/dt", "0.02");
+  AnySimulation facade(facade_model);
+  facade.set_traction("left", [](const double* X, double, double* f) { f[0] = -1000 * X[1], f[1] = 0; });
+  facade.set_pressure("left", [](const double*, double, double* p) { *p = 500; });
+  ASSERT_TRUE(facade.step().ok);
+
+  itr_model* model = itr_model_create(2);
+  ASSERT_EQ(itr_model_set_quadratic_mesh(model, 6, nodes.data(), 1, cell.data(), bodies.data()), ITR_SUCCESS);
+  ASSERT_EQ(itr_model_add_boundary(model, "left", 1, left.data(), nullptr), ITR_SUCCESS);
+  ASSERT_EQ(itr_model_set_options(model, kOptions), ITR_SUCCESS);
+  ASSERT_EQ(itr_model_set_number(model, "/time/dt", 0.02), ITR_SUCCESS);
+  itr_simulation* s = nullptr;
+  ASSERT_EQ(itr_simulation_create(model, nullptr, nullptr, &s), ITR_SUCCESS) << itr_model_message(model);
+  itr_set_traction(
+      s, "left", [](const double* X, double, double* f, void*) { f[0] = -1000 * X[1], f[1] = 0; }, nullptr);
+  itr_set_pressure(
+      s, "left", [](const double*, double, double* p, void*) { *p = 500; }, nullptr);
+  ASSERT_EQ(itr_step(s, 0), ITR_SUCCESS) << itr_simulation_message(s);
+  EXPECT_EQ(itr_time(s), 0.02);
+
+  const std::span<const double> x = facade.positions();
+  EXPECT_EQ(std::vector(itr_positions(s), itr_positions(s) + 12), std::vector(x.begin(), x.end()));
+  EXPECT_NE(x[10], 0);
+  EXPECT_EQ(ints(s, itr_get_bodies, 1), facade.bodies());
+  EXPECT_EQ(ints(s, itr_get_facets, 6), facade.facets());
+  EXPECT_EQ(ints(s, itr_get_facet_boundaries, 3), facade.facet_boundaries());
+  EXPECT_EQ(ints(s, itr_get_curved_edges, 6), facade.curved_edges());
+  EXPECT_EQ(doubles(s, itr_get_stress, 4), facade.stress());
+  EXPECT_EQ(doubles(s, itr_get_von_mises, 1), facade.von_mises());
+  EXPECT_GT(facade.von_mises()[0], 0);
+  itr_simulation_destroy(s);
+  itr_model_destroy(model);
+}
+
+TEST(CInterface, AdaptsAndTellsOfNewMeshes) {
+  CBlock block(kRemesh);
+  itr_simulation* s = block.simulation;
+  const int both[] = {1, 1};
+  itr_fix(
+      s, "left", both, [](const double*, double, double* u, void*) { u[0] = u[1] = 0; }, nullptr);
+  itr_set_acceleration(
+      s, [](const double*, double, double* a, void*) { a[0] = 0, a[1] = -100; }, nullptr);
+  struct Told {
+    int changes = 0, failed = 0;
+    double worst = 0;  ///< how far a constant field is from 1 on the new mesh
+  } told;
+  itr_on_mesh_change(
+      s,
+      [](const itr_mesh_change* change, void* user) {
+        Told& t = *static_cast<Told*>(user);
+        ++t.changes;
+        const std::vector<double> ones(change->old_vertices, 1.0);
+        std::vector<double> projected(change->new_vertices);
+        t.failed += itr_project(change, 1, ones.data(), projected.data()) != ITR_SUCCESS;
+        for (size_t i = 0; i < change->new_vertices; ++i) {
+          double interpolated = 0;
+          for (int k = change->row_start[i]; k < change->row_start[i + 1]; ++k) interpolated += change->value[k];
+          t.worst = std::max({t.worst, std::abs(projected[i] - 1), std::abs(interpolated - 1)});
+        }
+      },
+      &told);
+  const size_t cells = itr_num_cells(s);
+  ASSERT_EQ(itr_adapt(s, 0.01), ITR_SUCCESS) << itr_simulation_message(s);
+  EXPECT_EQ(itr_steps(s), 0);
+  EXPECT_EQ(told.changes, 1);
+  EXPECT_EQ(told.failed, 0);
+  EXPECT_LT(told.worst, 1e-12);
+  const size_t adapted = itr_num_cells(s);
+  EXPECT_GT(adapted, cells);
+  ASSERT_EQ(itr_freeze_mesh(s, 1), ITR_SUCCESS);
+  ASSERT_EQ(itr_step(s, 0.01), ITR_SUCCESS) << itr_simulation_message(s);
+  EXPECT_EQ(itr_num_cells(s), adapted);
+  EXPECT_EQ(told.changes, 1);
+}
+
+TEST(CInterface, MovesAnObstacle) {
+  CBlock block(R"({"contact": {"enabled": true, "dhat": 1e-3}})", [](itr_model* model) {
+    const double wall[] = {0.2005, -1, 0.2005, 1};
+    const int edge[] = {0, 1};
+    return itr_model_add_obstacle(model, "wall", 2, wall, 1, edge, 0, nullptr, nullptr);
+  });
+  const auto to_the_left = [](const double*, double t, double* u, void*) { u[0] = -t, u[1] = 0; };
+  EXPECT_EQ(itr_move_obstacle(block.simulation, "wand", to_the_left, nullptr), ITR_BAD_INPUT);
+  ASSERT_EQ(itr_move_obstacle(block.simulation, "wall", to_the_left, nullptr), ITR_SUCCESS);
+  ASSERT_EQ(itr_step(block.simulation, 0.01), ITR_SUCCESS) << itr_simulation_message(block.simulation);
+  for (size_t v = 0; v < itr_num_vertices(block.simulation); ++v)
+    EXPECT_LT(itr_positions(block.simulation)[2 * v], 0.2005 - 0.01) << v;
+}
+
+TEST(CInterface, HasTheVersionOfItsCitation) {
+  std::ifstream file(std::string(ITR_SOURCE_DIR) + "/CITATION.cff");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_NE(text.find("\nversion: " + std::string(itr_version()) + "\n"), std::string::npos) << itr_version();
 }
 
 TEST(CInterface, CountsCurvedEdges) {

@@ -4,12 +4,12 @@
 
 #include <random>
 
+#include "core/parallel.hpp"
 #include "energy/contact/candidates.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/contact/surface.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/newton/newton.hpp"
+#include "energy/contact/contact.hpp"
+#include "energy/contact/surface.hpp"
+#include "itr/solver.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 namespace {

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "geometry/ccd.hpp"
+#include "geometry/distance.hpp"
 #include "geometry/predicates.hpp"
-#include "itr/geometry/distance.hpp"
 #include "random_points.hpp"
 
 namespace itr {

@@ -8,9 +8,9 @@
 #include "curved_mesh.hpp"
 #include "derivatives.hpp"
 #include "energy/cell_model.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
+#include "energy/load.hpp"
 
 namespace itr {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "output/certify.hpp"
 #include "written_scenes.hpp"
 

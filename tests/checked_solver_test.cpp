@@ -2,7 +2,7 @@
 // Checks around every solver's engine: analyses that are not repeated, refinement and its count of iterations.
 #include <gtest/gtest.h>
 
-#include "itr/linear/engine.hpp"
+#include "itr/solver.hpp"
 #include "linear_systems.hpp"
 
 namespace itr::linear {

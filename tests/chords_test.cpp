@@ -8,11 +8,11 @@
 #include <random>
 
 #include "fem/refined_chords.hpp"
-#include "itr/simulation/simulation.hpp"
 #include "random_tets.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/state.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

@@ -15,9 +15,9 @@
 
 #include "block.hpp"
 #include "core/hdf5.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/writer.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
+#include "itr/scene.hpp"
 #include "output/certify.hpp"
 #include "simulation/contact_surface.hpp"
 

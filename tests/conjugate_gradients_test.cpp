@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "itr/linear/system.hpp"
+#include "linear/system.hpp"
 #include "linear_systems.hpp"
 
 namespace itr::linear {

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <random>
 
+#include "core/parallel.hpp"
 #include "derivatives.hpp"
+#include "energy/contact/friction.hpp"
+#include "energy/contact/stiffness.hpp"
+#include "energy/contact/surface.hpp"
+#include "energy/damping.hpp"
 #include "energy/mapped.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/contact/friction.hpp"
-#include "itr/energy/contact/stiffness.hpp"
-#include "itr/energy/contact/surface.hpp"
-#include "itr/energy/damping.hpp"
 
 namespace itr {
 namespace {

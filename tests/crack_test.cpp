@@ -11,22 +11,22 @@
 #include <optional>
 
 #include "cracked_mesh.hpp"
+#include "energy/load.hpp"
 #include "energy/load_points.hpp"
+#include "energy/pressure.hpp"
 #include "fem/locator.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/core/error.hpp"
-#include "itr/embed/any_simulation.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/energy/pressure.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/simulation/mesh_change.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "itr/energy.hpp"
+#include "itr/itr.hpp"
+#include "itr/solver.hpp"
+#include "itr/transfer.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -347,7 +347,7 @@ State<Dim> written_and_read(const Simulation<Dim>& simulation) {
       output::write_checkpoint(file, simulation.state(), {"{}", "eigen", "{}", 0});
     });
   });
-  return output::read_checkpoint<Dim>({path, "{}", "eigen", Dim}).state;
+  return *output::read_checkpoint<Dim>({path, "{}", "eigen", Dim}).state;
 }
 
 /// Cracks open far, and are pressed together then. Parts of cracks that are not plane close at once.

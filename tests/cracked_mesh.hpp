@@ -8,7 +8,7 @@
 #include <set>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

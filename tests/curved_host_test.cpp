@@ -8,10 +8,10 @@
 #include "curved_mesh.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "host_block.hpp"
-#include "itr/core/error.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/remesh/memory.hpp"
+#include "itr/core.hpp"
+#include "itr/energy.hpp"
 #include "random_quadratic.hpp"
+#include "remesh/memory.hpp"
 
 namespace itr {
 namespace {

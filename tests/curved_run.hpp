@@ -6,9 +6,9 @@
 
 #include <algorithm>
 
-#include "itr/simulation/simulation.hpp"
 #include "random_tets.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/state.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

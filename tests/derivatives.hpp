@@ -6,7 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "itr/energy/energy.hpp"
+#include "energy/energy.hpp"
 
 namespace itr {
 

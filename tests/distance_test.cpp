@@ -9,7 +9,7 @@
 #include <cmath>
 #include <functional>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/refine.hpp"
 #include "output/frame_file.hpp"
 #include "output/surface_distance.hpp"

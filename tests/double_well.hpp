@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "itr/energy/energy.hpp"
+#include "energy/energy.hpp"
 
 namespace itr {
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "linear_systems.hpp"
 #include "verification/solvers/dump.hpp"
 

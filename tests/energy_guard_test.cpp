@@ -7,8 +7,8 @@
 #include <limits>
 #include <string>
 
-#include "itr/linear/registry.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/solver.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
 #include "square_mesh.hpp"
 

@@ -7,12 +7,12 @@
 #include <random>
 
 #include "derivatives.hpp"
+#include "energy/damping.hpp"
+#include "energy/elastic/elastic.hpp"
 #include "energy/elastic/strain.hpp"
-#include "itr/energy/damping.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/pressure.hpp"
+#include "energy/inertia.hpp"
+#include "energy/load.hpp"
+#include "energy/pressure.hpp"
 #include "projection/volume_barrier.hpp"
 
 namespace itr {

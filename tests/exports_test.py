@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What the shared library shows: the functions of itr.h, each of them; of C++ what public headers name, and nothing else; its
-SONAME.
+"""What the shared library exports: the functions of itr.h, each of which a test names; of C++ what headers in include/itr mark
+with ITR_EXPORT, and its SONAME.
 
-usage: exports_test.py SOURCE_DIR SHARED_LIBRARY STATIC_LIBRARY [--write]
-
---write makes the list of names in src/itr.map anew, which the linker reads.
+usage: exports_test.py SOURCE_DIR SHARED_LIBRARY
 """
 
 import pathlib
@@ -12,91 +10,55 @@ import re
 import subprocess
 import sys
 
-NAMESPACES = {"linear", "scene", "output", "detail", "hdf5"}
-KINDS = ("_ZN3itr", "_ZNK3itr", "_ZT[ISV]N3itr")  # functions, const ones, type information and virtual tables
-HEAD = """# What the shared library shows: the functions of itr.h, and what the public headers name. tests/exports_test.py --write.
-ITR_0 {
-  global:
-    itr_*;
-"""
-TAIL = """  local:
-    *;
-};
-"""
 
-
-def run(*command):
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
-
-def symbols(*command):
-    return {line.split()[-1].split("@")[0] for line in run("nm", "--defined-only", *command).splitlines() if " " in line}
+def run(*command, **more):
+    return subprocess.run(command, capture_output=True, text=True, check=True, **more).stdout
 
 
 def without_comments(path):
     return re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
 
 
-def public_headers(include):
-    return {str(path.relative_to(include)): without_comments(path) for path in include.rglob("*.h*")}
+def marked(text):
+    """Names of the classes and functions that are marked in a header."""
+    return set(re.findall(r"\b(?:class|struct) ITR_EXPORT (\w+)", text)) | set(
+        re.findall(r"^ITR_EXPORT [^;({]*?\b(\w+)\(", text, re.MULTILINE))
 
 
 def entity(symbol):
-    """What a symbol belongs to, as the linker spells it: 4Mesh of itr::Mesh<2>::..., 6linear8Registry. None: not ours."""
-    match = re.match(r"_Z(?:NK?|T[ISV]N)3itr", symbol)
-    rest, name = symbol[match.end():] if match else "", ""
-    while digits := re.match(r"\d+", rest):
-        end = digits.end() + int(digits[0])
-        name, part, rest = name + rest[:end], rest[digits.end():end], rest[end:]
-        if part not in NAMESPACES:
-            return name
-    return None
-
-
-def name_of(entity_name):
-    """Registry of 6linear8Registry."""
-    while digits := re.match(r"\d+", entity_name):
-        end = digits.end() + int(digits[0])
-        name, entity_name = entity_name[digits.end():end], entity_name[end:]
-    return name
-
-
-def write_map(path, names):
-    lines = [f"    {' '.join(f'{kind}{name}*;' for kind in KINDS)}\n" for name in sorted(names)]
-    path.write_text(HEAD + "".join(lines) + TAIL)
+    """The class or function of itr that a demangled symbol belongs to: Mesh of itr::Mesh<2>::apply(...)."""
+    match = re.search(r"\bitr::(?:(?:linear|scene|output)::)?(\w+)", symbol.split("(")[0])
+    return match and match.group(1)
 
 
 def main():
-    root, shared, static = pathlib.Path(sys.argv[1]), sys.argv[2], sys.argv[3]
-    headers = public_headers(root / "include")
-    words = set(re.findall(r"\w+", "\n".join(headers.values())))
-    entities = {entity(symbol) for symbol in symbols("--extern-only", static)} - {None}
-    names = {name for name in entities if name_of(name) in words}
-    if "--write" in sys.argv:
-        write_map(root / "src/itr.map", names)
-        return 0
-
-    shown = symbols("-D", shared) - {"ITR_0"}
-    functions = {name for name in shown if name.startswith("itr_")}
-    declared = set(re.findall(r"ITR_C_API\s[^;(]*?\b(itr_\w+)\(", headers["itr/itr.h"]))
+    root, shared = pathlib.Path(sys.argv[1]), sys.argv[2]
+    headers = {path.name: without_comments(path) for path in (root / "include/itr").iterdir()}
+    symbols = [line.split()[-1] for line in run("nm", "-D", "--defined-only", shared).splitlines()]
+    functions = {name for name in symbols if name.startswith("itr_")}
+    demangled = [re.sub(r"^(typeinfo( name)?|vtable) for ", "", line)
+                 for line in run("c++filt", input="\n".join(set(symbols) - functions)).splitlines()]
+    entities = {entity(symbol) for symbol in demangled}
+    declared = set(re.findall(r"ITR_C_API\s[^;(]*?\b(itr_\w+)\(", headers["itr.h"]))
+    names = set().union(*(marked(text) for text in headers.values()))
+    tests = "\n".join(path.read_text() for path in (root / "tests").glob("*.cpp"))
     dynamic = run("readelf", "-d", shared)
     soname = re.search(r"SONAME\).*\[(.*)\]", dynamic)
     failures = []
-    if len(declared) < 40:
-        failures.append(f"only {len(declared)} functions were found in itr.h")
+    if len(declared) < 40 or len(names) < 30:
+        failures.append(f"only {len(declared)} functions and {len(names)} names were found in the headers")
     for title, found in [
         ("declared and not there", declared - functions),
         ("there and not declared", functions - declared),
-        ("of others", {name for name in shown - functions if entity(name) is None}),
-        ("in a public header and not shown: --write", names - {entity(name) for name in shown}),
-        ("shown and in no public header: --write", {entity(name) for name in shown - functions} - names - {None}),
+        ("in no test", {name for name in declared if not re.search(rf"\b{name}\b", tests)}),
+        ("marked and not exported", names - entities),
+        ("exported and not marked", {str(name) for name in entities - names}),
     ]:
         if found:
             failures.append(f"{title}: {' '.join(sorted(found)[:10])}")
     if not soname or soname.group(1) != "libitr.so.0":
         failures.append(f"SONAME is {soname and soname.group(1)}, not libitr.so.0")
-    print("\n".join(failures) or f"{len(functions)} functions of C, {len(shown) - len(functions)} symbols of C++, "
-          f"of {len(entities)} names {len(names)}, in {len(headers)} headers")
+    print("\n".join(failures) or f"{len(functions)} functions of C, {len(demangled)} symbols of {len(names)} names of C++")
     return 1 if failures else 0
 
 

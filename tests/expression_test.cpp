@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "scene/expression.hpp"
 #include "scene/interpolation.hpp"
 

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 #include "random_cube.hpp"
@@ -176,7 +176,7 @@ TEST(FlatObstacles, AreAsTheyWereAfterRestoringAndFailedSteps) {
     });
   });
   Simulation<2> resumed(setup, registry);
-  resumed.restore(output::read_checkpoint<2>({path, "{}", "eigen", 2}).state);
+  resumed.restore(*output::read_checkpoint<2>({path, "{}", "eigen", 2}).state);
   EXPECT_EQ(length(resumed), length(simulation));
   while (!resumed.finished()) ASSERT_TRUE(resumed.advance().ok);
   EXPECT_EQ(resumed.state().history.x[0], end);

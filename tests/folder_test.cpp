@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A run has its folder alone, and removes and replaces only files that runs wrote there.
-#include "itr/output/folder.hpp"
+#include "itr/output.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,7 @@
 #include <set>
 
 #include "interrupt.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/checkpoint.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 namespace {

@@ -7,12 +7,12 @@
 #include <random>
 #include <sstream>
 
+#include "energy/inertia.hpp"
+#include "fem/cell_set.hpp"
 #include "host_block.hpp"
-#include "itr/core/error.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/simulation/resultant.hpp"
+#include "itr/core.hpp"
+#include "itr/energy.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 namespace {

@@ -7,8 +7,8 @@
 #include <functional>
 
 #include "host_block.hpp"
-#include "itr/core/error.hpp"
-#include "itr/simulation/resultant.hpp"
+#include "itr/core.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 namespace {

@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "core/hdf5.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "output/files.hpp"
 
 namespace itr::output {

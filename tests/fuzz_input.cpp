@@ -18,10 +18,10 @@
 
 #include "core/process.hpp"
 #include "core/timer.hpp"
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 #include "mesh/mesh_file.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 namespace {

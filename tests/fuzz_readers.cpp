@@ -19,14 +19,14 @@
 
 #include "core/hdf5.hpp"
 #include "core/process.hpp"
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 #include "mesh/mesh_file.hpp"
 #include "mesh_formats.hpp"
 #include "output/certify.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 namespace {
@@ -226,7 +226,7 @@ std::string saved_state(Setup<Dim> setup, const fs::path& folder) {
 template <int Dim>
 void read_state(const fs::path& path, const std::shared_ptr<Simulation<Dim>>& simulation) {
   auto checkpoint = output::read_checkpoint<Dim>({path, "{}", "eigen", Dim});
-  simulation->restore(std::move(checkpoint.state));
+  simulation->restore(*checkpoint.state);
   simulation->report();
 }
 

@@ -9,10 +9,10 @@
 
 #include "geometry/bvh.hpp"
 #include "geometry/closed_surface.hpp"
+#include "geometry/distance.hpp"
 #include "geometry/intersection.hpp"
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
-#include "itr/geometry/distance.hpp"
 #include "random_points.hpp"
 
 namespace itr {

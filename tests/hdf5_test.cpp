@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "core/hdf5.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::hdf5 {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {

@@ -4,10 +4,10 @@
 
 #include <random>
 
+#include "energy/contact/contact.hpp"
+#include "energy/inertia.hpp"
 #include "fem/inverted.hpp"
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "projection/safe_projection.hpp"
 #include "random_cube.hpp"
 #include "random_mesh.hpp"

@@ -7,13 +7,13 @@
 #include <string>
 
 #include "derivatives.hpp"
+#include "energy/elastic/laws.hpp"
 #include "energy/follower.hpp"
+#include "energy/load.hpp"
+#include "fem/cell_set.hpp"
 #include "host_block.hpp"
-#include "itr/core/error.hpp"
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "itr/core.hpp"
+#include "itr/energy.hpp"
 
 namespace itr {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "fem/locator.hpp"
 #include "host_block.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 namespace {

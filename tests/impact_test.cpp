@@ -6,9 +6,9 @@
 #include <limits>
 #include <string>
 
-#include "itr/core/error.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/linear/registry.hpp"
+#include "core/parallel.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "linear/choice.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"

@@ -10,8 +10,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 #include "linear/choice.hpp"
 
 namespace itr {

@@ -9,9 +9,9 @@
 #include <random>
 
 #include "derivatives.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "fem/cell_set.hpp"
+#include "geometry/quadratic_validity.hpp"
 #include "random_quadratic.hpp"
 
 namespace itr {

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Facts as JSON: `itr distance` on a stretched unit square, whose displacement is known on any mesh, `itr certify --json` of the
-same runs, and `itr explain --json`. Argument: the command."""
+same runs, `itr explain --json`, and profile.jsonl. Argument: the command."""
 import json
 import pathlib
 import struct
@@ -121,6 +121,25 @@ class Distance(Runs):
             log.write("{broken\n")
         self.assertIn("steps.jsonl: line 4: found {broken; expected JSON", distance(run, other_shape, status=2))
         distance(run, status=2)
+
+
+class Profile(Runs):
+    def test_each_moment_is_in_one_phase_and_results_stay(self):
+        path = self.write_scene(0.1, 3)
+        folders = [path.with_suffix(name) for name in (".plain", ".profiled")]
+        subprocess.run([ITR, "run", path, "-o", folders[0]], check=True, capture_output=True)
+        subprocess.run([ITR, "run", path, "-o", folders[1], "--profile", "--threads", "1"], check=True, capture_output=True)
+        self.assertFalse((folders[0] / "profile.jsonl").exists())
+        lines = [json.loads(line) for line in (folders[1] / "profile.jsonl").read_text().splitlines()]
+        self.assertEqual([(line["step"], line["threads"]) for line in lines], [(1, 1), (2, 1)])
+        for line in lines:
+            phases = {phase["phase"]: phase for phase in line["phases"]}
+            self.assertLessEqual({"assembly of elastic", "solve", "output", "rest"}, set(phases))
+            for phase in phases.values():
+                self.assertLessEqual(phase["span"], phase["predicted"]["64"] * (1 + 1e-9))
+                self.assertLessEqual(phase["predicted"]["64"], phase["predicted"]["2"])
+                self.assertLessEqual(phase["predicted"]["2"], phase["work"] * (1 + 1e-9))
+        self.assertEqual(distance(*folders)["l2"], 0)
 
 
 class Certify(Runs):

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
 #include "output/checkpoint.hpp"
 #include "output/frame_file.hpp"
 #include "random_tets.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 namespace {
@@ -135,7 +135,7 @@ class SavedStrata : public ::testing::Test {
         damage(file);
       });
     });
-    return output::read_checkpoint<3>({path, "scene", "backend", 3}).state;
+    return *output::read_checkpoint<3>({path, "scene", "backend", 3}).state;
   }
 
   void expect_refused(const std::string& name, const std::vector<std::int64_t>& values, int columns,

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

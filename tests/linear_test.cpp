@@ -8,8 +8,8 @@
 #include <sstream>
 #include <thread>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "linear_systems.hpp"
 
 namespace itr::linear {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "energy/least_motion.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "random_tets.hpp"
 #include "simulation/held_turn.hpp"
 #include "simulation/step_problem.hpp"

@@ -4,8 +4,8 @@
 
 #include <set>
 
-#include "itr/geometry/distance.hpp"
-#include "itr/simulation/mesh_change.hpp"
+#include "geometry/distance.hpp"
+#include "itr/transfer.hpp"
 #include "random_mesh.hpp"
 #include "random_tets.hpp"
 

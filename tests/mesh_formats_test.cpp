@@ -4,10 +4,10 @@
 
 #include <functional>
 
-#include "itr/simulation/simulation.hpp"
 #include "mesh/mesh_file.hpp"
 #include "mesh_formats.hpp"
 #include "scene_folder.hpp"
+#include "simulation/state.hpp"
 
 namespace itr::scene {
 namespace {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <numeric>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/mesh_file.hpp"
 #include "mesh/refine.hpp"
 

@@ -10,8 +10,8 @@
 #include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
-#include "itr/core/error.hpp"
-#include "itr/mesh/mesh.hpp"
+#include "itr/core.hpp"
+#include "itr/mesh.hpp"
 #include "mesh/refine.hpp"
 #include "remesh/edits.hpp"
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 
 namespace {
 

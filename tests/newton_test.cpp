@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The minimiser itself, on energies of a few unknowns whose minima are known.
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "double_well.hpp"
-#include "itr/energy/contact/contact.hpp"
+#include "energy/contact/contact.hpp"
 #include "linear/choice.hpp"
 
 namespace itr {

@@ -14,8 +14,8 @@
 
 #include "core/hdf5.hpp"
 #include "core/process.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 #include "written_scenes.hpp"
 
 namespace itr::output {

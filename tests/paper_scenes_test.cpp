@@ -5,8 +5,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 
 namespace itr::scene {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <iostream>
 
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 #include "random_quadratic.hpp"
 
 namespace itr {

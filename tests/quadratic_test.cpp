@@ -7,22 +7,22 @@
 #include <random>
 #include <set>
 
+#include "core/parallel.hpp"
 #include "curved_mesh.hpp"
 #include "derivatives.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
+#include "energy/load.hpp"
+#include "energy/pressure.hpp"
 #include "fem/chords.hpp"
-#include "itr/core/error.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/pressure.hpp"
-#include "itr/fem/quadrature.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "fem/quadrature.hpp"
+#include "geometry/quadratic_validity.hpp"
+#include "itr/core.hpp"
 #include "random_quadratic.hpp"
 #include "remesh/edits.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 namespace {

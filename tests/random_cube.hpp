@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "geometry/measures.hpp"
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

@@ -10,11 +10,11 @@
 #include <random>
 #include <vector>
 
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/remesh/fields.hpp"
+#include "energy/contact/contact.hpp"
+#include "energy/elastic/elastic.hpp"
 #include "remesh/decide/trial.hpp"
 #include "remesh/edits.hpp"
+#include "remesh/fields.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

@@ -4,7 +4,7 @@
 #include <array>
 #include <random>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "itr/fem/cell_set.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "fem/cell_set.hpp"
+#include "geometry/quadratic_validity.hpp"
 
 namespace itr {
 

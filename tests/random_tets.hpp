@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "geometry/measures.hpp"
-#include "itr/mesh/mesh.hpp"
-#include "itr/mesh/strata.hpp"
+#include "itr/mesh.hpp"
+#include "mesh/strata.hpp"
 #include "propose_split.hpp"
 #include "remesh/edits.hpp"
 

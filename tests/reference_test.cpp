@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 #include "scene/defaults.hpp"
 #include "scene/key_table.hpp"
 

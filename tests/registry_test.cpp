@@ -11,8 +11,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 namespace {

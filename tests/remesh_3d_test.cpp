@@ -6,13 +6,13 @@
 #include <memory>
 #include <random>
 
+#include "core/parallel.hpp"
 #include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/trial.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 #include "tet_scene.hpp"
 

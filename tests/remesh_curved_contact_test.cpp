@@ -8,20 +8,20 @@
 #include <random>
 
 #include "apply_edit.hpp"
+#include "core/parallel.hpp"
 #include "curved_mesh.hpp"
 #include "curved_run.hpp"
 #include "curved_trial.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/simulation/simulation.hpp"
 #include "mesh/validate.hpp"
 #include "random_mesh.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/remesher.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/patch_surface.hpp"
+#include "simulation/state.hpp"
 #include "tet_scene.hpp"
 
 namespace itr {

@@ -8,8 +8,8 @@
 #include <span>
 
 #include "curved_scene.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "remesh/contact/gate.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 #include "simulation/invariants.hpp"
 

@@ -2,10 +2,10 @@
 // Whole runs with curved edges: they choose the order, keep momentum in free flight, and do with one of two operations.
 #include <gtest/gtest.h>
 
+#include "core/parallel.hpp"
 #include "curved_mesh.hpp"
 #include "curved_run.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/inertia.hpp"
+#include "energy/inertia.hpp"
 
 namespace itr {
 namespace {

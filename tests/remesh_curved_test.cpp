@@ -10,9 +10,9 @@
 #include "curved_scene.hpp"
 #include "curved_trial.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/remesh/remesher.hpp"
+#include "itr/transfer.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

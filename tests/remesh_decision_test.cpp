@@ -7,9 +7,9 @@
 
 #include "fem/inverted.hpp"
 #include "geometry/dynamic_tree.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

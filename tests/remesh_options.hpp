@@ -2,7 +2,7 @@
 // Options of remeshing with nothing left open, for tests that call the remesher themselves.
 #pragma once
 
-#include "itr/remesh/options.hpp"
+#include "itr/options.hpp"
 
 namespace itr {
 

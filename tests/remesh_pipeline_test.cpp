@@ -6,8 +6,8 @@
 
 #include <set>
 
+#include "core/parallel.hpp"
 #include "fem/inverted.hpp"
-#include "itr/core/parallel.hpp"
 #include "random_mesh.hpp"
 #include "remesh_options.hpp"
 

@@ -6,14 +6,14 @@
 
 #include <cstring>
 
+#include "core/parallel.hpp"
 #include "fem/inverted.hpp"
 #include "geometry/measures.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/remesh/remesher.hpp"
+#include "itr/transfer.hpp"
 #include "random_mesh.hpp"
 #include "random_terms.hpp"
 #include "remesh/decide/patch.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "fem/inverted.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "random_terms.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 

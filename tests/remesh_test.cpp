@@ -7,10 +7,10 @@
 
 #include "fem/inverted.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/patch.hpp"
 #include "remesh/decide/prediction.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 #include "whole_mesh_energy.hpp"
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <set>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "output/report_json.hpp"
 
 namespace itr {

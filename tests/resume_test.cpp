@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "interrupt.hpp"
-#include "itr/output/checkpoint.hpp"
+#include "itr/output.hpp"
 #include "output/certify.hpp"
 
 namespace itr::output {

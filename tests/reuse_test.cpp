@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Factors that serve more than one system: what is solved, what is found out about a matrix, what is remembered.
-#include "itr/linear/reuse.hpp"
+#include "linear/reuse.hpp"
 
 #include <gtest/gtest.h>
 

@@ -8,9 +8,9 @@
 #include <random>
 
 #include "interrupt.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/checkpoint.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
+#include "itr/scene.hpp"
 #include "output/certify.hpp"
 
 namespace itr::output {
@@ -122,7 +122,7 @@ TEST_F(DamageTest, OfInvariantsIsRefused) {
   const auto saved = find_saved_state(run);
   ASSERT_TRUE(saved.has_value());
   auto checkpoint = read_checkpoint<2>(*saved);
-  const State<2> good = checkpoint.state;
+  const State<2> good = *checkpoint.state;
   const scene::Scene scene =
       scene::read(fmt::format("{}/examples/{}", ITR_SOURCE_DIR, kStopped.scene), {{"/space/remesh/enabled", "false"}});
   linear::Registry registry;

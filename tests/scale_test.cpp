@@ -9,10 +9,9 @@
 #include <string>
 
 #include "core/count.hpp"
-#include "itr/core/error.hpp"
-#include "itr/linear/engine.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
+#include "simulation/state.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

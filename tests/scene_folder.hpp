@@ -11,8 +11,8 @@
 #include <variant>
 #include <vector>
 
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 
 namespace itr::scene {
 

@@ -12,8 +12,8 @@
 #include <string>
 #include <utility>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "simulation/advice.hpp"
 #include "simulation/step_problem.hpp"
 #include "square_mesh.hpp"

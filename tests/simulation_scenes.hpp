@@ -7,8 +7,8 @@
 #include <ostream>
 
 #include "fem/inverted.hpp"
-#include "itr/simulation/simulation.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/state.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

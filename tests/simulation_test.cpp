@@ -4,10 +4,10 @@
 
 #include <memory>
 
-#include "itr/core/error.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/linear/registry.hpp"
+#include "core/parallel.hpp"
+#include "energy/inertia.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "linear/forwarding.hpp"
 #include "simulation/step_problem.hpp"
 #include "simulation_scenes.hpp"

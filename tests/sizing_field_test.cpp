@@ -6,8 +6,8 @@
 #include <random>
 
 #include "fem/inverted.hpp"
-#include "itr/remesh/remesher.hpp"
 #include "random_cube.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 #include "square_mesh.hpp"
 

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "itr/core/error.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
 #include "linear/choice.hpp"
+#include "simulation/state.hpp"
 
 namespace itr::linear {
 namespace {

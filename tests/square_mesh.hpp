@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "simulation/step_problem.hpp"
 #include "simulation_scenes.hpp"
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {

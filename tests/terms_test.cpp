@@ -8,12 +8,12 @@
 #include <map>
 
 #include "energy/follower.hpp"
-#include "itr/energy/incremental_potential.hpp"
-#include "itr/remesh/remesher.hpp"
+#include "energy/incremental_potential.hpp"
 #include "random_mesh.hpp"
 #include "remesh/decide/prediction.hpp"
 #include "remesh/decide/prospect.hpp"
 #include "remesh/edits.hpp"
+#include "remesh/remesher.hpp"
 #include "remesh_options.hpp"
 
 namespace itr {

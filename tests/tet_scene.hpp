@@ -5,8 +5,8 @@
 #include <limits>
 #include <random>
 
-#include "itr/remesh/remesher.hpp"
 #include "random_tets.hpp"
+#include "remesh/remesher.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "itr/time/integrator.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 namespace {

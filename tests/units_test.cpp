@@ -16,7 +16,7 @@
 #include <sstream>
 
 #include "core/hdf5.hpp"
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 namespace {

@@ -10,15 +10,15 @@
 #include <stdexcept>
 #include <vector>
 
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/contact/friction.hpp"
-#include "itr/energy/damping.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/energy/pressure.hpp"
-#include "itr/newton/newton.hpp"
-#include "itr/remesh/fields.hpp"
+#include "energy/contact/contact.hpp"
+#include "energy/contact/friction.hpp"
+#include "energy/damping.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
+#include "energy/load.hpp"
+#include "energy/pressure.hpp"
+#include "newton/newton.hpp"
+#include "remesh/fields.hpp"
 
 namespace itr {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

@@ -12,7 +12,7 @@
 #include "../common/blas.hpp"
 #include "../common/openmp.hpp"
 #include "../common/ordering.hpp"
-#include "itr/linear/module_adapter.hpp"
+#include "itr/module.h"
 
 namespace {
 

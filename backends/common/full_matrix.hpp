@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "itr/linear/abi.h"
+#include "itr/module.h"
 
 namespace itr::backends {
 

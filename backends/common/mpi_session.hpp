@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "itr/linear/abi.h"
+#include "itr/module.h"
 
 namespace itr::backends {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/linear/abi.h"
+#include "itr/module.h"
 
 namespace itr::backends {
 

@@ -16,7 +16,7 @@
 #include "../common/blas.hpp"
 #include "../common/ordering.hpp"
 #include "../common/rank_session.hpp"
-#include "itr/linear/module_adapter.hpp"
+#include "itr/module.h"
 
 #ifdef ITR_MUMPS_HAS_SCOTCH
 extern "C" void SCOTCH_randomReset(void);  // NOLINT(readability-identifier-naming)

@@ -12,7 +12,7 @@
 #include <array>
 #include <type_traits>
 
-#include "itr/linear/abi.h"
+#include "itr/module.h"
 
 namespace itr::backends {
 

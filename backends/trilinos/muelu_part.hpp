@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/linear/iteration_options.hpp"
+#include "itr/module.h"
 
 namespace itr::backends {
 

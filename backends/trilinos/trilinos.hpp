@@ -10,8 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "itr/linear/abi.h"
-#include "itr/linear/module_adapter.hpp"
+#include "itr/module.h"
 
 namespace itr::backends {
 

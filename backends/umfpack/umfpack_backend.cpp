@@ -10,7 +10,7 @@
 #include "../common/blas.hpp"
 #include "../common/full_matrix.hpp"
 #include "../common/ordering.hpp"
-#include "itr/linear/module_adapter.hpp"
+#include "itr/module.h"
 
 namespace {
 

@@ -3,7 +3,7 @@
 // energy, gradient, Hessian (blocks, here into a sparse matrix) and the part of a step that is free of collisions.
 #include <Eigen/SparseCholesky>
 #include <cstdio>
-#include <itr/energy/contact/contact.hpp>
+#include <itr/contact.hpp>
 
 namespace {
 
@@ -47,9 +47,9 @@ int main() {
     if (v + 1 != kRope) edges.push_back({v, v + 1});
   std::vector<char> counts(kVertices, 0);  // pairs of two roof vertices do not count
   std::fill_n(counts.begin(), kRope, 1);
-  const auto surface = itr::make_collision_surface<2>(edges, {}, {}, rest, counts);
+  const auto surface = itr::collision_surface<2>(edges, {}, {}, rest, counts);
   const itr::ContactOptions options{.enabled = true, .activation_distance = 0.01};
-  const itr::ContactEnergy<2> contact(surface, options, 1e6, kStep * kStep);
+  const itr::ContactEnergy<2> contact(*surface, options, 1e6, kStep * kStep);
   itr::Workspace workspace;
 
   VectorX x(2 * kVertices), v = VectorX::Zero(2 * kVertices);

@@ -2,7 +2,6 @@
 // A term of the program's own: soft springs from the bottom of a block to the ground (a Winkler foundation), as a sum over
 // boundary facets. The remesher sees it as it sees the library's terms: it is asked for patches too.
 #include <cstdio>
-#include <itr/fem/cell_set.hpp>
 #include <itr/itr.hpp>
 
 namespace {

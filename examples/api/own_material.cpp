@@ -63,7 +63,7 @@ double stretch(bool own) {
   itr::Simulation<2> simulation(std::move(setup), registry);
   const itr::StepResult result = simulation.advance();
   if (!result.ok) std::printf("%s\n", result.reason.c_str());
-  return -simulation.state().history.x[0].minCoeff();
+  return -simulation.positions().minCoeff();
 }
 
 }  // namespace

@@ -4,11 +4,10 @@
 #include <Eigen/IterativeLinearSolvers>
 #include <cstdio>
 #include <cstdlib>
-#include <itr/core/error.hpp>
-#include <itr/linear/engine.hpp>
-#include <itr/linear/registry.hpp>
-#include <itr/scene/scene.hpp>
-#include <itr/simulation/simulation.hpp>
+#include <itr/core.hpp>
+#include <itr/scene.hpp>
+#include <itr/simulation.hpp>
+#include <itr/solver.hpp>
 
 namespace {
 

@@ -3,7 +3,7 @@
 // their cells. Integrals are kept to round-off, which interpolation does not do.
 #include <cmath>
 #include <cstdio>
-#include <itr/projection/transfer.hpp>
+#include <itr/transfer.hpp>
 
 namespace {
 

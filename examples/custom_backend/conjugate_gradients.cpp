@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "itr/linear/module_adapter.hpp"
+#include "itr/module.h"
 
 namespace {
 

@@ -84,7 +84,7 @@ ITR_C_API itr_status itr_project(const itr_mesh_change* change, size_t component
 /** level: 0 debug, 1 information, 2 warning */
 typedef void (*itr_log_function)(int level, const char* message, void* user);
 
-/** Version of the library, such as "0.1.0". */
+/** Version of the library, such as "0.2.0". */
 ITR_C_API const char* itr_version(void);
 
 /* --- models: copied by the simulations that are made from them ---------------------------------------------------- */

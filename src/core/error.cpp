@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 #include <limits>
 

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <limits>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::hdf5 {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <vector>
+
+#include "core/profile.hpp"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -54,14 +56,16 @@ void parallel_blocks(std::size_t n, std::size_t block, const std::function<void(
   if (n == 0) return;
   const std::size_t blocks = (n + block - 1) / block;
   const auto run = [&](std::size_t b) { body(b * block, std::min(n, (b + 1) * block)); };
-  if (blocks == 1 || num_threads() == 1) {
-    for (std::size_t b = 0; b < blocks; ++b) run(b);
+  if (blocks == 1) return run(0);
+  LoopTimer timer;
+  if (num_threads() == 1) {
+    for (std::size_t b = 0; b < blocks; ++b) timer.run([&] { run(b); });
     return;
   }
   LoopOrder order;
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t b) {
     order.begin_block();
-    run(b);
+    timer.run([&] { run(b); });
     order.end_block();
   });
   order.finish();

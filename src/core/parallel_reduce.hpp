@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/embed/any_simulation.hpp"
+#include "itr/itr.hpp"
 
 #include <fmt/format.h>
 
@@ -9,16 +9,16 @@
 #include <numeric>
 
 #include "arrays.hpp"
+#include "core/parallel.hpp"
+#include "energy/energy.hpp"
 #include "energy/project_block.hpp"
+#include "fem/cell_set.hpp"
 #include "fem/locator.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/simulation/resultant.hpp"
+#include "itr/energy.hpp"
 #include "named_parts.hpp"
 #include "simulation/cell_stress.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 
@@ -154,7 +154,7 @@ struct AnySimulation::Impl {
     std::map<std::string, std::vector<int>> obstacle_vertices;
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
-    const Mesh<Dim>& mesh() const { return simulation.state().mesh; }
+    const Mesh<Dim>& mesh() const { return simulation.mesh(); }
     /// Also what a simulation that `remeshes` may curve later, be its mesh frozen now or not.
     void refuse_curved(const std::string& place, bool remeshes) const {
       if (mesh().has_nodes()) refuse(place, "curved edges", "a mesh with straight edges alone (discr_order 1)");
@@ -293,10 +293,10 @@ double AnySimulation::step_length() const {
   return impl_->visit([](const auto& d) { return d.simulation.setup().time.dt; });
 }
 double AnySimulation::time() const {
-  return impl_->visit([](const auto& d) { return d.simulation.state().t; });
+  return impl_->visit([](const auto& d) { return d.simulation.time(); });
 }
 int AnySimulation::steps() const {
-  return impl_->visit([](const auto& d) { return d.simulation.state().step; });
+  return impl_->visit([](const auto& d) { return d.simulation.steps(); });
 }
 bool AnySimulation::finished() const {
   return impl_->visit([](const auto& d) { return d.simulation.finished(); });

@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

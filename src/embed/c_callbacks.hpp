@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "itr/embed/any_simulation.hpp"
 #include "itr/itr.h"
+#include "itr/itr.hpp"
 
 namespace itr {
 

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "c_callbacks.hpp"
-#include "itr/core/error.hpp"
-#include "itr/embed/any_simulation.hpp"
+#include "itr/core.hpp"
 #include "itr/itr.h"
+#include "itr/itr.hpp"
 
 struct itr_model {
   itr::Model model;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/embed/model.hpp"
+#include "itr/itr.hpp"
 
 #include <fmt/format.h>
 

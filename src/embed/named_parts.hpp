@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "arrays.hpp"
-#include "itr/mesh/mesh.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/mesh.hpp"
+#include "itr/scene.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

@@ -10,8 +10,8 @@
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/point.hpp"
 #include "energy/load_points.hpp"
+#include "fem/mass.hpp"
 #include "geometry/measures.hpp"
-#include "itr/fem/mass.hpp"
 
 namespace itr {
 

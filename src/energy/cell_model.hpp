@@ -7,8 +7,8 @@
 #include <memory>
 
 #include <boost/container/small_vector.hpp>
-#include "itr/energy/terms.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "energy/terms.hpp"
+#include "geometry/quadratic_validity.hpp"
 
 namespace itr {
 

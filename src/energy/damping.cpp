@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/damping.hpp"
+#include "energy/damping.hpp"
 
 namespace itr {
 

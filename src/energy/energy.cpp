@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/energy.hpp"
+#include "energy/energy.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "itr/core/kept_vector.hpp"
+#include "core/kept_vector.hpp"
+#include "core/profile.hpp"
 #include "round_off.hpp"
 
 namespace itr {
 
 namespace {
+constexpr std::string_view kAssembly = "assembly";
+
 struct SecondWays {  // which say that two terms can tell
   KeptVector ways;
 };
@@ -60,6 +63,7 @@ bool Energy::find_blocking(ConstVectorView, ConstVectorView, double, BlockingPai
 double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
   double sum = 0;
   for (const auto& term : terms_) {
+    const ScopedPhase phase("energy", term->name());
     sum += term->value(x, workspace);
     if (!std::isfinite(sum)) return sum;
   }
@@ -67,16 +71,25 @@ double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
 }
 
 void EnergySum::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
-  for (const auto& term : terms_) term->add_gradient(x, gradient, workspace);
+  for (const auto& term : terms_) {
+    const ScopedPhase phase(kAssembly, term->name());
+    term->add_gradient(x, gradient, workspace);
+  }
 }
 
 void EnergySum::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
-  for (const auto& term : terms_) term->add_hessian(x, psd, sink, workspace);
+  for (const auto& term : terms_) {
+    const ScopedPhase phase(kAssembly, term->name());
+    term->add_hessian(x, psd, sink, workspace);
+  }
 }
 
 void EnergySum::add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes,
                                        Workspace& workspace) const {
-  for (const auto& term : terms_) term->add_gradient_and_sizes(x, gradient, sizes, workspace);
+  for (const auto& term : terms_) {
+    const ScopedPhase phase(kAssembly, term->name());
+    term->add_gradient_and_sizes(x, gradient, sizes, workspace);
+  }
 }
 
 double EnergySum::value_round_off(ConstVectorView x, Workspace& workspace) const {
@@ -86,6 +99,7 @@ double EnergySum::value_round_off(ConstVectorView x, Workspace& workspace) const
 }
 
 double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
+  const ScopedPhase phase("ccd");
   double step = 1;
   auto& kept = workspace.get<PartOfWay>().dx;
   KeptVector part = std::move(kept);  // a term may be a sum itself

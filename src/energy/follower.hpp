@@ -3,9 +3,9 @@
 
 #include <span>
 
-#include "itr/energy/energy.hpp"
-#include "itr/energy/host_terms.hpp"
-#include "itr/energy/quadratic_blocks.hpp"
+#include "energy/energy.hpp"
+#include "energy/quadratic_blocks.hpp"
+#include "itr/energy.hpp"
 
 namespace itr {
 

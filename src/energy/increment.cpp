@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/increment.hpp"
+#include "energy/increment.hpp"
 
 #include <cmath>
 
+#include "core/profile.hpp"
 #include "round_off.hpp"
 
 namespace itr {
@@ -40,6 +41,7 @@ double EnergyOfIncrement::value(ConstVectorView d, Workspace& workspace) const {
   const ConstVectorView x = positions(d, workspace);
   double sum = 0;
   for (const Term& term : terms_) {
+    const ScopedPhase phase("energy", term.energy->name());
     sum += term.incremental ? term.incremental->value_at({base_, d}, workspace) : term.energy->value(x, workspace);
     if (!std::isfinite(sum)) return sum;
   }
@@ -48,6 +50,7 @@ double EnergyOfIncrement::value(ConstVectorView d, Workspace& workspace) const {
 
 void EnergyOfIncrement::add_gradient_of(const Term& term, const Increment& at, ConstVectorView x, VectorView gradient,
                                         Workspace& workspace) const {
+  const ScopedPhase phase("assembly", term.energy->name());
   if (term.incremental)
     term.incremental->add_gradient_at(at, gradient, workspace);
   else
@@ -76,6 +79,7 @@ void EnergyOfIncrement::add_hessian(ConstVectorView d, PsdProjection psd, Hessia
 }
 
 double EnergyOfIncrement::value_round_off(ConstVectorView d, Workspace& workspace) const {
+  const auto phase = ScopedPhase::coarse("round-off");
   const ConstVectorView x = positions(d, workspace);
   double sum = 0;
   for (const Term& term : terms_)
@@ -85,6 +89,7 @@ double EnergyOfIncrement::value_round_off(ConstVectorView d, Workspace& workspac
 }
 
 void EnergyOfIncrement::add_gradient_round_off(ConstVectorView d, VectorView round_off, Workspace& workspace) const {
+  const auto phase = ScopedPhase::coarse("round-off");
   auto& scratch = workspace.get<RoundOffScratch>();
   VectorView base = scratch.base.resize(d.size()), other = scratch.d.resize(d.size());
   VectorView change = scratch.gradient.resize(d.size());

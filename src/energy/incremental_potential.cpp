@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/incremental_potential.hpp"
+#include "energy/incremental_potential.hpp"
 
 #include <utility>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/inertia.hpp"
+#include "energy/inertia.hpp"
 
-#include "itr/core/parallel.hpp"
-#include "itr/energy/elastic/laws.hpp"
+#include "core/parallel.hpp"
+#include "energy/elastic/laws.hpp"
 #include "mass_block.hpp"
 
 namespace itr {

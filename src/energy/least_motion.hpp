@@ -4,9 +4,9 @@
 #include <map>
 #include <vector>
 
-#include "itr/energy/energy.hpp"
-#include "itr/energy/material.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/energy.hpp"
+#include "fem/cell_set.hpp"
+#include "itr/options.hpp"
 
 namespace itr {
 

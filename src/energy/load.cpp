@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/load.hpp"
+#include "energy/load.hpp"
 
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/fem/quadrature.hpp"
+#include <algorithm>
+#include <cmath>
+#include "energy/elastic/laws.hpp"
+#include "fem/quadrature.hpp"
+
 #include "load_points.hpp"
 
 namespace itr {

@@ -6,8 +6,8 @@
 #include <Eigen/Geometry>
 #include <array>
 
+#include "energy/load.hpp"
 #include "geometry/measures.hpp"
-#include "itr/energy/load.hpp"
 
 namespace itr {
 

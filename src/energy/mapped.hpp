@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <memory>
 
-#include "itr/energy/energy.hpp"
-#include "itr/fem/vertex_map.hpp"
+#include "energy/energy.hpp"
+#include "fem/vertex_map.hpp"
 
 namespace itr {
 

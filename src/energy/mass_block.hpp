@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/fem/mass.hpp"
+#include "fem/mass.hpp"
 
 namespace itr {
 

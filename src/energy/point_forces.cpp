@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/point_forces.hpp"
+#include "itr/energy.hpp"
 
 #include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
 
+#include "energy/energy.hpp"
+#include "energy/increment.hpp"
+#include "fem/cell_set.hpp"
 #include "fem/locator.hpp"
+#include "fem/quadratic.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/core/error.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/energy/increment.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadratic.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

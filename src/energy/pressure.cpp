@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/pressure.hpp"
+#include "energy/pressure.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "fem/quadrature.hpp"
 #include "geometry/measures.hpp"
-#include "itr/fem/quadrature.hpp"
 #include "project_block.hpp"
 
 namespace itr {

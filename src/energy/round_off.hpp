@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

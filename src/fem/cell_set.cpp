@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/fem/cell_set.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

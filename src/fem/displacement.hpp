@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

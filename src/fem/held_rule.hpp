@@ -6,7 +6,7 @@
 #include <array>
 #include <map>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

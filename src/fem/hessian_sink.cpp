@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "itr/fem/hessian_sink.hpp"
+#include "fem/hessian_sink.hpp"
 
 #include <algorithm>
 #include <utility>
 
 #include "core/count.hpp"
+#include "core/profile.hpp"
 
 namespace itr {
 
@@ -123,6 +124,7 @@ const SparseAssembler::Gather& SparseAssembler::gather(std::size_t kind, std::si
 
 void SparseAssembler::add_batch(std::size_t kind, std::size_t first, const double* blocks) {
   const Gather& list = gather(kind, first / kBatch);
+  add_bytes(static_cast<double>((sizeof(double) + sizeof(int)) * (list.source.size() + 2 * list.nonzero.size())));
   parallel_blocks(list.nonzero.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       double sum = 0;

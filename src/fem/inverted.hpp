@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/fem/cell_set.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "fem/cell_set.hpp"
+#include "geometry/quadratic_validity.hpp"
 #include "mesh/validate.hpp"
 
 namespace itr {

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
+#include "fem/cell_set.hpp"
+#include "fem/quadratic.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadratic.hpp"
 
 namespace itr {
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "itr/fem/quadratic.hpp"
-#include "itr/mesh/mesh.hpp"
+#include "fem/quadratic.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

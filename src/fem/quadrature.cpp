@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // Points and weights: Gauss-Legendre; Strang and Fix (1973), Dunavant (1985) on triangles; Keast (1986), Walkington (2000)
 // on tetrahedra.
-#include "itr/fem/quadrature.hpp"
+#include "fem/quadrature.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

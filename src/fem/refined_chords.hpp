@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "fem/chord_levels.hpp"
 #include "fem/chords.hpp"
-#include "itr/fem/chord_levels.hpp"
 
 namespace itr {
 

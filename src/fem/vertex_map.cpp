@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/fem/vertex_map.hpp"
+#include "fem/vertex_map.hpp"
 
 #include <utility>
 

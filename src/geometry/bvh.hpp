@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 // Incremental Potential Contact", section 5). It may stop early, never late.
 #pragma once
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "itr/geometry/closed_faces.hpp"
+#include "geometry/closed_faces.hpp"
 
 #include <limits>
 
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 namespace itr {
 

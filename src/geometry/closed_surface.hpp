@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "geometry/bvh.hpp"
-#include "itr/geometry/closed_faces.hpp"
+#include "geometry/closed_faces.hpp"
 
 namespace itr {
 

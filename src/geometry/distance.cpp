@@ -5,7 +5,7 @@
 //   dD/dx_i = 2 c_i r,
 //   d2D/dx2 = H_xx - H_xb H_bb^-1 H_bx,  H_xx = 2 c c^T (x) I,  H_x_bk = 2 (C_ik r + c_i J_k),  H_bb = 2 J^T J,  J =
 //   dr/dbeta.
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

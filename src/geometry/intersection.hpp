@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "geometry/measures.hpp"
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -2,7 +2,7 @@
 // Exact predicates on the given doubles (CGAL's filtered exact kernel stays in the .cpp).
 #pragma once
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

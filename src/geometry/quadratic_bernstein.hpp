@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
 
 namespace itr {
 

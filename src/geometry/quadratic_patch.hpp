@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "geometry/predicates.hpp"
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

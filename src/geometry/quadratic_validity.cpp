@@ -2,7 +2,7 @@
 // Round-off, u = 2^-53: positions relative to the first node and J from them have errors below 32 u Y, Y the largest of
 // these; a mean of determinants of columns with entries below m_1, ..., m_d adds at most 138 u m_1 ... m_d, and twenty
 // halvings of place and time another 360 u. kUnits = 2048 bounds the sum with room.
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
 
 #include <Eigen/LU>
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -6,8 +6,8 @@
 #include <new>
 #include <utility>
 
-#include "itr/linear/engine.hpp"
-#include "itr/linear/registry.hpp"
+#include "core/profile.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 
@@ -68,6 +68,7 @@ class CheckedSolver final : public Solver {
   std::string message() const override { return message_; }
 
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
+    const ScopedPhase phase("analyse");
     ready_ = false;
     // An analysis of a direct solver sees the pattern alone. (An iterative one may use where the nodes are, and a result
     // that depended on where they once were could not be repeated from a saved state.)
@@ -85,6 +86,7 @@ class CheckedSolver final : public Solver {
   }
 
   Outcome factorize(std::span<const double> values) override {
+    const ScopedPhase phase("factorise");
     ready_ = false;
     if (!analyzed_) return note(Outcome::failed, "no analysis to factorise with");
     if (values.size() != pattern_.nonzeros())
@@ -95,10 +97,12 @@ class CheckedSolver final : public Solver {
       return pattern_.order == 0 ? Outcome::ok : note(engine_->factorize(values));
     });
     ready_ = outcome == Outcome::ok;
+    if (Profile::active()) add_bytes(engine_->statistics().factor_bytes);
     return outcome;
   }
 
   SolveReport solve(std::span<const double> B, std::span<double> X, int columns, double asked) override {
+    const ScopedPhase phase("solve");
     const std::size_t n = pattern_.order;
     iterations_ = 0;
     if (!ready_) return {note(Outcome::failed, "no factorisation to solve with"), kUnknown};
@@ -106,6 +110,7 @@ class CheckedSolver final : public Solver {
       return {note(Outcome::failed, "wrong length of a vector"), kUnknown};
     if (n == 0 || columns == 0) return {};
     if (!is_finite(B)) return {note(Outcome::non_finite, "a right-hand side is not finite"), kUnknown};
+    if (Profile::active()) add_bytes(2 * columns * engine_->statistics().factor_bytes);
     SolveReport report{Outcome::ok, kUnknown};
     report.outcome = guarded([&] {
       report = solve_checked(B, X, columns, asked);

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "forwarding.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::linear {
 

@@ -5,9 +5,9 @@
 #include <functional>
 #include <memory>
 
-#include "itr/core/log.hpp"
-#include "itr/linear/options.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/options.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

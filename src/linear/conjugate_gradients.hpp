@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/noise.hpp"
-#include "itr/linear/solver.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "eigen_engines.hpp"
-#include "itr/linear/iteration_options.hpp"
+#include "itr/module.h"
 
 // Eigen 3.4's SparseLU frees its factors when they have to grow, and goes on with the freed memory if no more is left. This
 // specialisation keeps them, so that std::bad_alloc leaves a solver that can be destroyed, and moves pages instead of

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "itr/linear/engine.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/linear/solver.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

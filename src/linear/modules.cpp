@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "blas_kernels.hpp"
-#include "itr/linear/engine.hpp"
+#include "itr/solver.hpp"
 
 /// The folder of the prefix that a program was linked against: the installed package compiles it into the program.
 extern "C" __attribute__((weak)) const char* itr_installed_backends();

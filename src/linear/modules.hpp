@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "itr/linear/abi.h"
-#include "itr/linear/registry.hpp"
+#include "itr/module.h"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

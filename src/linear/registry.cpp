@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "eigen_engines.hpp"
-#include "itr/core/error.hpp"
-#include "itr/linear/iteration_options.hpp"
+#include "itr/core.hpp"
+#include "itr/module.h"
 #include "linear/choice.hpp"
 #include "modules.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/reuse.hpp"
+#include "linear/reuse.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "conjugate_gradients.hpp"
+#include "core/profile.hpp"
 #include "linear/choice.hpp"
 
 namespace itr::linear {
@@ -118,6 +119,7 @@ SolveReport ReusingSolver::solve(std::span<const double> B, std::span<double> X,
 
 SystemReport ReusingSolver::solve_system(std::span<const double> values, std::span<const double> b, const Asked& asked,
                                          std::span<double> x) {
+  const ScopedPhase phase("iterate");
   if (!pattern_) return describe(solver_.factorize(values), solver_);  // says what is missing
   const bool goes_on = asked.goes_on && last_ == Last::iterated;
   if (!goes_on) take_in(values);

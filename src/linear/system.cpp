@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/linear/system.hpp"
+#include "linear/system.hpp"
 
 namespace itr::linear {
 

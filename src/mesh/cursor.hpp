@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "core/quoted.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

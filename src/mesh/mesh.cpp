@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -10,7 +10,7 @@
 
 #include "core/check.hpp"
 #include "geometry/measures.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr {

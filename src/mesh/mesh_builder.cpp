@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/mesh_file.hpp"
 
 namespace itr {

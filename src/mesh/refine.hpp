@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

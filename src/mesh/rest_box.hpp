@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/mesh/strata.hpp"
+#include "mesh/strata.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

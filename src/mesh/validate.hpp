@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "itr/geometry/closed_faces.hpp"
-#include "itr/mesh/mesh.hpp"
+#include "geometry/closed_faces.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

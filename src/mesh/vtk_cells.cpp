@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "readers.hpp"
 
 namespace itr {

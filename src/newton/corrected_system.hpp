@@ -5,7 +5,7 @@
 #include <functional>
 #include <limits>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

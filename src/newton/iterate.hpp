@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "core/timer.hpp"
-#include "itr/newton/newton.hpp"
+#include "newton.hpp"
 
 namespace itr {
 
@@ -111,6 +112,7 @@ class Iterate {
     if (value_round_off_at_ != revision_) {
       const ScopedTimer timer(task_.summary.line_search_seconds);
       value_round_off_ = task_.energy.value_round_off(x_, task_.workspace);
+      if (value_round_off_at_ == kNone) first_round_off_ = value_round_off_;
       value_round_off_at_ = revision_;
     }
     return value_round_off_;
@@ -127,8 +129,15 @@ class Iterate {
     }
     return gradient_round_off_;
   }
-  /// Whether a step promises less than the energy resolves.
-  bool is_unresolved(const Step& step) const { return decrement_of(step) < value_round_off(); }
+  /// Whether a step promises less than the energy resolves. Round-off costs as much as a gradient. It is asked for where the
+  /// first one, and what forces have done since, leave it open.
+  bool is_unresolved(const Step& step) const {
+    constexpr double kSafe = 1e4;
+    const double decrement = decrement_of(step);
+    const bool is_open = value_round_off_at_ == kNone ||
+                         decrement < kSafe * (first_round_off_ + std::numeric_limits<double>::epsilon() * work_);
+    return is_open && decrement < value_round_off();
+  }
 
   double value_at(ConstVectorView x) const {
     const ScopedTimer timer(task_.summary.line_search_seconds);
@@ -155,6 +164,7 @@ class Iterate {
     has_gradient_ = true;
     gradient_norm_ = task_.norms.of_gradient(gradient_);
     force_size_ = task_.norms.of_forces(sizes);
+    work_ = sizes.dot(x_.cwiseAbs());
   }
   void move_to(ConstVectorView x, double value) {
     x_ = x;
@@ -170,7 +180,8 @@ class Iterate {
   VectorView x_, gradient_;
   double value_;
   double gradient_norm_ = 0, force_size_ = 0;
-  mutable double value_round_off_ = 0, gradient_round_off_ = 0;
+  double work_ = 0;  ///< of the sizes of all forces along x
+  mutable double first_round_off_ = 0, value_round_off_ = 0, gradient_round_off_ = 0;
   mutable int value_round_off_at_ = kNone, gradient_round_off_at_ = kNone;  ///< revisions of x
   bool has_gradient_ = false;
   int revision_ = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 #include <cmath>
 #include <sstream>

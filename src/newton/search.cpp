@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/timer.hpp"
-#include "itr/newton/newton.hpp"
+#include "newton.hpp"
 
 namespace itr {
 

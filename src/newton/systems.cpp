@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/newton/newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

@@ -8,12 +8,12 @@
 #include <optional>
 
 #include "curve_checks.hpp"
+#include "fem/quadratic.hpp"
 #include "frame_surface.hpp"
 #include "geometry/closed_surface.hpp"
 #include "geometry/predicates.hpp"
-#include "itr/core/error.hpp"
-#include "itr/fem/quadratic.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

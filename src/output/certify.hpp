@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

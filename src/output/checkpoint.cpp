@@ -6,8 +6,9 @@
 #include <limits>
 
 #include "frame_file.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "report_json.hpp"
+#include "simulation/state.hpp"
 
 namespace itr::output {
 
@@ -361,7 +362,9 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   const hdf5::File file = hdf5::File::open(saved.file);
   if (!file.has_digests()) throw InputError({saved.file.string(), "/digests", "none", "those of what was saved"});
   Checkpoint<Dim> checkpoint;
-  State<Dim>& state = checkpoint.state;
+  const auto made = std::make_shared<State<Dim>>();
+  checkpoint.state = made;
+  State<Dim>& state = *made;
   try {
     state.mesh = read_mesh<Dim>(saved.file, file);
   } catch (const InputError& error) {

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "core/hdf5.hpp"
-#include "itr/core/units.hpp"
-#include "itr/output/checkpoint.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

@@ -6,12 +6,12 @@
 #include <map>
 #include <optional>
 
+#include "fem/quadratic.hpp"
+#include "fem/quadrature.hpp"
 #include "frame_file.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/core/error.hpp"
-#include "itr/fem/quadratic.hpp"
-#include "itr/fem/quadrature.hpp"
+#include "itr/core.hpp"
 #include "surface_distance.hpp"
 
 namespace itr::output {

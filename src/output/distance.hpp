@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr::output {
 

@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

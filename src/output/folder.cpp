@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/output/folder.hpp"
+#include "itr/output.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,7 +14,7 @@
 
 #include "file_list.hpp"
 #include "files.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::output {
 

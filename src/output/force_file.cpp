@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "frame_file.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/folder.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "files.hpp"
-#include "itr/simulation/frame.hpp"
+#include "itr/frame.hpp"
 
 namespace itr::output {
 

@@ -7,9 +7,9 @@
 
 #include "core/check.hpp"
 #include "drawn_cells.hpp"
+#include "fem/quadratic.hpp"
 #include "file_list.hpp"
-#include "itr/core/error.hpp"
-#include "itr/fem/quadratic.hpp"
+#include "itr/core.hpp"
 #include "set_members.hpp"
 #include "units.hpp"
 

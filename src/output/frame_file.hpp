@@ -11,8 +11,8 @@
 
 #include "core/hdf5.hpp"
 #include "files.hpp"
-#include "itr/core/units.hpp"
-#include "itr/simulation/frame.hpp"
+#include "itr/core.hpp"
+#include "itr/frame.hpp"
 #include "output/distance.hpp"
 
 namespace itr::output {

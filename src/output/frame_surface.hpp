@@ -13,7 +13,7 @@
 
 #include "frame_file.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/geometry/closed_faces.hpp"
+#include "geometry/closed_faces.hpp"
 
 namespace itr::output {
 

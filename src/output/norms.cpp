@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fem/cell_set.hpp"
+#include "fem/quadrature.hpp"
 #include "geometry/measures.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadrature.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "core/hdf5.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "simulation/report_fields.hpp"
 #include "units.hpp"
 

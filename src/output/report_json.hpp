@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "distance.hpp"
-#include "itr/core/error.hpp"
-#include "itr/output/checkpoint.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

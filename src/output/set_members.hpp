@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "itr/simulation/frame.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/frame.hpp"
+#include "itr/setup.hpp"
 
 namespace itr::output {
 

@@ -10,7 +10,7 @@
 #include <queue>
 
 #include "geometry/bvh.hpp"
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 namespace itr::output {
 

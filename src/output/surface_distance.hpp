@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr::output {
 

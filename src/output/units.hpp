@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "itr/core/units.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 
 namespace itr::output {
 

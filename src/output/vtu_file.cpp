@@ -10,9 +10,9 @@
 #include <span>
 
 #include "drawn_cells.hpp"
+#include "fem/quadratic.hpp"
 #include "files.hpp"
-#include "itr/core/error.hpp"
-#include "itr/fem/quadratic.hpp"
+#include "itr/core.hpp"
 #include "set_members.hpp"
 #include "units.hpp"
 

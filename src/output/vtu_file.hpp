@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "itr/core/units.hpp"
-#include "itr/simulation/frame.hpp"
+#include "itr/core.hpp"
+#include "itr/frame.hpp"
 
 namespace itr::output {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 
 #include <fmt/format.h>
 
@@ -13,8 +13,9 @@
 #include "files.hpp"
 #include "force_file.hpp"
 #include "frame_file.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "report_json.hpp"
+#include "simulation/state.hpp"
 #include "time_series.hpp"
 #include "units.hpp"
 #include "vtu_file.hpp"
@@ -185,11 +186,11 @@ Writer::Writer(fs::path directory, OutputOptions options, RunInfo info)
 
 template <int Dim>
 Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpoint<Dim>& checkpoint)
-    : impl_(
-          std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state.step, checkpoint.log_bytes)) {
+    : impl_(std::make_unique<Impl>(std::move(folder), options, std::move(info), checkpoint.state->step,
+                                   checkpoint.log_bytes)) {
   impl_->totals.restore(checkpoint.totals);
   impl_->seconds_before = impl_->totals.report().seconds.total;
-  const State<Dim>& state = checkpoint.state;
+  const State<Dim>& state = *checkpoint.state;
   impl_->norms = displacement_norms(state.mesh, state.history.x[0]);
 }
 

@@ -3,8 +3,8 @@
 // rule b).
 #pragma once
 
-#include "itr/fem/mass.hpp"
-#include "itr/projection/transfer.hpp"
+#include "fem/mass.hpp"
+#include "itr/transfer.hpp"
 
 namespace itr {
 

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
-#include "itr/newton/newton.hpp"
+#include "energy/contact/contact.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
+#include "geometry/quadratic_validity.hpp"
+#include "newton/newton.hpp"
 #include "projection/volume_barrier.hpp"
 
 namespace itr {

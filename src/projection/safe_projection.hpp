@@ -4,10 +4,10 @@
 // keep them valid, so they act nearer than what the interpolant has, and push nothing that is well where it is.
 #pragma once
 
-#include "itr/energy/contact/surface.hpp"
-#include "itr/energy/material.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/linear/solver.hpp"
+#include "energy/contact/surface.hpp"
+#include "fem/cell_set.hpp"
+#include "itr/options.hpp"
+#include "itr/solver.hpp"
 
 namespace itr {
 

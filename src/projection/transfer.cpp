@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/projection/transfer.hpp"
+#include "itr/transfer.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/SparseCore>

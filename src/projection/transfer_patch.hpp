@@ -5,9 +5,9 @@
 #include <map>
 #include <vector>
 
-#include "itr/energy/material.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/projection/transfer.hpp"
+#include "fem/cell_set.hpp"
+#include "itr/options.hpp"
+#include "itr/transfer.hpp"
 
 namespace itr {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/energy/energy.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/energy.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

@@ -11,10 +11,10 @@
 #include <filesystem>
 
 #include "apps/report/report.hpp"
+#include "core/parallel.hpp"
 #include "embed/c_callbacks.hpp"
-#include "itr/core/parallel.hpp"
 #include "itr/itr.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/output.hpp"
 #include "simulation/report_fields.hpp"
 
 namespace py = pybind11;

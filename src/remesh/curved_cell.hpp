@@ -5,12 +5,12 @@
 #include <Eigen/LU>
 #include <algorithm>
 
+#include "fem/cell_set.hpp"
 #include "fem/chords.hpp"
+#include "fem/quadratic.hpp"
+#include "fem/quadrature.hpp"
 #include "geometry/measures.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadratic.hpp"
-#include "itr/fem/quadrature.hpp"
-#include "itr/remesh/fields.hpp"
+#include "remesh/fields.hpp"
 
 namespace itr {
 

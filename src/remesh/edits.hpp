@@ -7,9 +7,9 @@
 #include <functional>
 #include <optional>
 
-#include "itr/mesh/mesh.hpp"
-#include "itr/mesh/strata.hpp"
-#include "itr/remesh/refusal.hpp"
+#include "itr/frame.hpp"
+#include "itr/mesh.hpp"
+#include "mesh/strata.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/remesh/fields.hpp"
+#include "remesh/fields.hpp"
 
 #include <algorithm>
 

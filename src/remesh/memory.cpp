@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/remesh/memory.hpp"
+#include "remesh/memory.hpp"
 
 #include <algorithm>
 

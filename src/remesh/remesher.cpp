@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/remesh/remesher.hpp"
+#include "remesh/remesher.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "geometry/measures.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
 #include "remesh/decide/prospect.hpp"
 #include "remesh/edits.hpp"
 #include "remesh/placed_cell.hpp"

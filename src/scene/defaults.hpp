@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

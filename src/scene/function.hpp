@@ -2,7 +2,7 @@
 // Vector values of a scene (docs/theory.md, "Conditions") into functions of rest position and time.
 #pragma once
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 #include "mesh/mesh_file.hpp"
 #include "node.hpp"
 #include "sets.hpp"

@@ -9,8 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "itr/core/error.hpp"
-#include "itr/core/units.hpp"
+#include "itr/core.hpp"
 
 namespace itr::scene {
 

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "geometry.hpp"
-#include "itr/scene/scene.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/scene.hpp"
+#include "itr/setup.hpp"
 #include "node.hpp"
 #include "sets.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 
 #include <algorithm>
 #include <limits>

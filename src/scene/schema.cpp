@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "defaults.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
 #include "key_table.hpp"
 #include "simulation/unsupported.hpp"
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 #include "node.hpp"
 
 namespace itr::scene {

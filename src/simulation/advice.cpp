@@ -15,8 +15,8 @@
 
 #include "barrier_stiffness.hpp"
 #include "geometry/measures.hpp"
-#include "itr/core/error.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/core.hpp"
+#include "itr/setup.hpp"
 #include "mesh/connected_parts.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/resolution.hpp"

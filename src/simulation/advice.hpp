@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

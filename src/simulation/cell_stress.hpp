@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 

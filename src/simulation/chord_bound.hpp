@@ -5,8 +5,8 @@
 
 #include <span>
 
-#include "itr/fem/chord_levels.hpp"
-#include "itr/simulation/setup.hpp"
+#include "fem/chord_levels.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

@@ -2,9 +2,9 @@
 // Which faces are closed, by the steps that Mesh::steps_apart counts.
 #pragma once
 
+#include "fem/chord_levels.hpp"
 #include "geometry/closed_surface.hpp"
-#include "itr/fem/chord_levels.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

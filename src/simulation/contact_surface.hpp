@@ -4,11 +4,11 @@
 #include <memory>
 #include <vector>
 
+#include "energy/contact/surface.hpp"
+#include "fem/chord_levels.hpp"
+#include "fem/vertex_map.hpp"
 #include "geometry/closed_surface.hpp"
-#include "itr/energy/contact/surface.hpp"
-#include "itr/fem/chord_levels.hpp"
-#include "itr/fem/vertex_map.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "barrier_stiffness.hpp"
-#include "itr/core/error.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/core.hpp"
+#include "itr/setup.hpp"
 #include "mesh/rest_box.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/remesh_step.hpp"

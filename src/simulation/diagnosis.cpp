@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "itr/fem/quadrature.hpp"
+#include "fem/quadrature.hpp"
 
 namespace itr {
 

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "itr/energy/incremental_potential.hpp"
-#include "itr/newton/newton.hpp"
+#include "energy/incremental_potential.hpp"
+#include "newton/newton.hpp"
 #include "simulation/contact_surface.hpp"
 
 namespace itr {

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "fem/chords.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/simulation.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 

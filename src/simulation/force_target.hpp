@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "itr/simulation/resultant.hpp"
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
+#include "simulation/resultant.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/frame.hpp"
+#include "itr/frame.hpp"
 
 #include <algorithm>
 #include <type_traits>

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "simulation/frame_data.hpp"
+
 // Data of a frame: energy densities and stresses by cell, sums of forces, energy and momentum.
 #include <array>
 #include <cmath>
@@ -7,7 +9,7 @@
 
 #include "cell_stress.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
-#include "itr/energy/inertia.hpp"
+#include "energy/inertia.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
 
@@ -42,39 +44,6 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
     f(*element, std::span<const CellPoint<Dim>>(points));
   }
 }
-
-}  // namespace
-
-template <int Dim>
-typename Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>& state, const NodalForces& forces) const {
-  const int bodies = state.mesh.num_nodes();
-  FrameData data;
-  data.x = state.history.x[0].head(Dim * bodies);
-  data.v = state.history.v[0].head(Dim * bodies);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
-  const auto add_density = [&](const auto& element, auto points) {
-    const Material& material = setup().materials.at(element.body);
-    double mean = 0;
-    for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
-    if (element.curved)
-      mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
-                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));
-    data.elastic_density.push_back(mean);
-  };
-  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup().quadrature_degree, add_density);
-  data.asked.forces = forces;
-  add_asked(cells, state, data);
-  const VectorX& all = state.history.x[0];
-  for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
-  if (setup().proxy) {
-    const VectorX y = proxy_map(setup(), state.mesh)->positions(all);
-    for (std::size_t v = 0; v < setup().proxy->rest.size(); ++v)
-      data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
-  }
-  return data;
-}
-
-namespace {
 
 template <int Dim>
 ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
@@ -128,6 +97,34 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
   return stress;
 }
 
+/// Adds the fields that the setup asks for.
+template <int Dim>
+void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, FrameData<Dim>& data) {
+  const FieldOptions& options = setup.fields;
+  AskedFields& asked = data.asked;
+  const NodalForces all = std::exchange(asked.forces, {});
+  if (options.contact_forces) asked.forces.contact = all.contact;
+  if (options.friction_forces) asked.forces.friction = all.friction;
+  if (options.reaction_forces) asked.forces.reaction = all.reaction;
+  if (options.applied_forces) asked.forces.applied = all.applied;
+  for (const ForceTarget& target : options.curves)
+    asked.curves.push_back(curve_point(sum_forces(state, all, target), target.name));
+  if (options.von_mises || options.stress) {
+    CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup);
+    if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
+    if (options.stress) asked.stress = std::move(stress.cauchy);
+  }
+  if (!options.kinetic_energy && !options.momentum) return;
+  VectorX product = VectorX::Zero(data.v.size());
+  InertiaEnergy<Dim>(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+                     VectorX::Zero(data.v.size()))
+      .add_mass_product(data.v, product);
+  if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
+  if (!options.momentum) return;
+  asked.momentum.assign(Dim, 0);
+  for (Eigen::Index i = 0; i < product.size(); ++i) asked.momentum[i % Dim] += product[i];
+}
+
 }  // namespace
 
 template <int Dim>
@@ -141,35 +138,35 @@ template CellStress cell_stress(const Simulation<2>&);
 template CellStress cell_stress(const Simulation<3>&);
 
 template <int Dim>
-void Simulation<Dim>::add_asked(const CellSet<Dim>& cells, const State<Dim>& state, FrameData& data) const {
-  const FieldOptions& options = setup().fields;
-  AskedFields& asked = data.asked;
-  const NodalForces all = std::exchange(asked.forces, {});
-  if (options.contact_forces) asked.forces.contact = all.contact;
-  if (options.friction_forces) asked.forces.friction = all.friction;
-  if (options.reaction_forces) asked.forces.reaction = all.reaction;
-  if (options.applied_forces) asked.forces.applied = all.applied;
-  for (const ForceTarget& target : options.curves)
-    asked.curves.push_back(curve_point(sum_forces(state, all, target), target.name));
-  if (options.von_mises || options.stress) {
-    CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup());
-    if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
-    if (options.stress) asked.stress = std::move(stress.cauchy);
+FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces) {
+  const int bodies = state.mesh.num_nodes();
+  FrameData<Dim> data;
+  data.x = state.history.x[0].head(Dim * bodies);
+  data.v = state.history.v[0].head(Dim * bodies);
+  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
+  const auto add_density = [&](const auto& element, auto points) {
+    const Material& material = setup.materials.at(element.body);
+    double mean = 0;
+    for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    if (element.curved)
+      mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
+                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));
+    data.elastic_density.push_back(mean);
+  };
+  for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup.quadrature_degree, add_density);
+  data.asked.forces = forces;
+  add_asked(setup, cells, state, data);
+  const VectorX& all = state.history.x[0];
+  for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
+  if (setup.proxy) {
+    const VectorX y = proxy_map(setup, state.mesh)->positions(all);
+    for (std::size_t v = 0; v < setup.proxy->rest.size(); ++v)
+      data.proxy_x.emplace_back(vertex_of<Dim>(y, static_cast<int>(v)));
   }
-  if (!options.kinetic_energy && !options.momentum) return;
-  VectorX product = VectorX::Zero(data.v.size());
-  InertiaEnergy<Dim>(cells, setup().materials, setup().lump_mass ? MassKind::lumped : MassKind::consistent,
-                     VectorX::Zero(data.v.size()))
-      .add_mass_product(data.v, product);
-  if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
-  if (!options.momentum) return;
-  asked.momentum.assign(Dim, 0);
-  for (Eigen::Index i = 0; i < product.size(); ++i) asked.momentum[i % Dim] += product[i];
+  return data;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                    \
-  template Simulation<Dim>::FrameData Simulation<Dim>::frame_data(const State<Dim>&, const NodalForces&) const; \
-  template void Simulation<Dim>::add_asked(const CellSet<Dim>&, const State<Dim>&, Simulation<Dim>::FrameData&) const;
-ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
+template FrameData<2> frame_data(const Setup<2>&, const State<2>&, const NodalForces&);
+template FrameData<3> frame_data(const Setup<3>&, const State<3>&, const NodalForces&);
 
 }  // namespace itr

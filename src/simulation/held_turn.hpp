@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "itr/energy/energy.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/energy.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

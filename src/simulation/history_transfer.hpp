@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/core/log.hpp"
-#include "itr/linear/solver.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/simulation/setup.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/core.hpp"
+#include "itr/setup.hpp"
+#include "itr/solver.hpp"
+#include "itr/transfer.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

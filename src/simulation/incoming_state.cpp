@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <memory>
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"

@@ -2,8 +2,8 @@
 // States that no step made: the initial one, and a saved one that is restored.
 #pragma once
 
-#include "itr/simulation/setup.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/setup.hpp"
+#include "itr/simulation.hpp"
 #include "simulation/step.hpp"
 #include "simulation/step_problem.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "itr/fem/chord_levels.hpp"
-#include "itr/simulation/setup.hpp"
+#include "fem/chord_levels.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

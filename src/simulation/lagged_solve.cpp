@@ -18,10 +18,10 @@
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/least_motion.hpp"
+#include "fem/hessian_sink.hpp"
 #include "held_turn.hpp"
-#include "itr/core/types.hpp"
-#include "itr/core/units.hpp"
-#include "itr/fem/hessian_sink.hpp"
+#include "itr/core.hpp"
+#include "itr/types.hpp"
 #include "newton/corrected_system.hpp"
 #include "simulation/step_problem.hpp"
 

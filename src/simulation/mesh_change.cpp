@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/mesh_change.hpp"
+#include "itr/transfer.hpp"
 
 #include <limits>
 
 #include "fem/locator.hpp"
 #include "geometry/bvh.hpp"
+#include "geometry/distance.hpp"
 #include "geometry/measures.hpp"
-#include "itr/geometry/distance.hpp"
 
 namespace itr {
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "itr/energy/contact/surface.hpp"
-#include "itr/simulation/setup.hpp"
+#include "energy/contact/surface.hpp"
+#include "itr/setup.hpp"
 #include "projection/transfer_patch.hpp"
 
 namespace itr {

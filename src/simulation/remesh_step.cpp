@@ -7,16 +7,17 @@
 #include <map>
 #include <set>
 
+#include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/inertia.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/point_forces.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/simulation/simulation.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/energy.hpp"
+#include "itr/simulation.hpp"
+#include "itr/transfer.hpp"
+#include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/moment.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 
@@ -253,6 +254,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   RemeshReport remeshed;
   {
     const ScopedTimer timer(report.seconds.remesh);
+    const auto phase = ScopedPhase::coarse("remeshing");
     if (state.mesh.has_nodes() && state.strata.empty()) state.strata = Strata<Dim>(state.mesh);
     remeshed = operate(state.mesh, fields, context, options, state.remesh_memory, state.strata);
   }
@@ -260,6 +262,7 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   if (!remeshed.changed()) return std::nullopt;
 
   const ScopedTimer timer(report.seconds.projection);
+  const auto phase = ScopedPhase::coarse("projection");
   TouchedCells touched{removed_cells(before.mesh, state.mesh), {}};
   auto map = state.mesh.compact();
   state.strata.compact(map);

@@ -4,7 +4,7 @@
 
 #include <tuple>
 
-#include "itr/simulation/frame.hpp"
+#include "itr/frame.hpp"
 
 namespace itr {
 

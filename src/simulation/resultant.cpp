@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/resultant.hpp"
+#include "simulation/resultant.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <set>
 
-#include "itr/core/error.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "fem/cell_set.hpp"
+#include "itr/core.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/moment.hpp"
 

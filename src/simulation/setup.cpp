@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <set>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "simulation/force_target.hpp"
 
 namespace itr {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/simulation/simulation.hpp"
+#include "simulation/state.hpp"
 
 #include <fmt/format.h>
 
@@ -13,9 +13,10 @@
 #include "core/process.hpp"
 #include "geometry/rotation.hpp"
 #include "incoming_state.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "simulation/flat_obstacles.hpp"
+#include "simulation/frame_data.hpp"
 #include "simulation/step.hpp"
 #include "simulation/step_problem.hpp"
 #include "unsupported.hpp"
@@ -468,12 +469,13 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
 }
 
 template <int Dim>
-void Simulation<Dim>::restore(State<Dim> state) {
+void Simulation<Dim>::restore(const State<Dim>& state) {
   impl_->refuse_in_callback("restore");
   refuse_misfit(impl_->setup, state);
   if (!impl_->state->mesh.has_nodes() && state.mesh.has_nodes()) refuse_unsupported(impl_->setup, state);
-  if (!state.strata.empty() && !state.strata.find_defect(state.mesh).empty()) state.strata = {};
-  impl_->change_to(std::make_shared<State<Dim>>(std::move(state)));
+  auto copy = std::make_shared<State<Dim>>(state);
+  if (!copy->strata.empty() && !copy->strata.find_defect(copy->mesh).empty()) copy->strata = {};
+  impl_->change_to(std::move(copy));
   impl_->flats->stretch(impl_->state->doublings, impl_->setup.obstacles);
   impl_->report.reset();
   impl_->set_forces_at_rest();
@@ -485,8 +487,52 @@ bool Simulation<Dim>::finished() const {
 }
 
 template <int Dim>
+double Simulation<Dim>::time() const {
+  return impl_->state->t;
+}
+
+template <int Dim>
+int Simulation<Dim>::steps() const {
+  return impl_->state->step;
+}
+
+template <int Dim>
+const Mesh<Dim>& Simulation<Dim>::mesh() const {
+  return impl_->state->mesh;
+}
+
+template <int Dim>
+ConstVectorView Simulation<Dim>::positions() const {
+  return impl_->state->history.x[0].head(Dim * mesh().num_nodes());
+}
+
+template <int Dim>
+ConstVectorView Simulation<Dim>::velocities() const {
+  return impl_->state->history.v[0].head(Dim * mesh().num_nodes());
+}
+
+template <int Dim>
 const State<Dim>& Simulation<Dim>::state() const {
   return *impl_->state;
+}
+
+template <int Dim>
+void Simulation<Dim>::observe(const std::function<void(const FrameView<Dim>&)>& observer) const {
+  observe(save(), observer);
+}
+
+template <int Dim>
+void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
+                              const std::function<void(const FrameView<Dim>&)>& observer) const {
+  const Setup<Dim>& setup = impl_->setup;
+  const FrameData<Dim> data = frame_data(setup, *snapshot.state, snapshot.forces);
+  FrameView<Dim> frame{snapshot.state->mesh,      data.x,          data.v,
+                       data.elastic_density,      data.obstacle_x, setup.obstacles.edges,
+                       setup.obstacles.triangles, &data.asked};
+  frame.names = &setup.names;
+  frame.dhat = setup.contact.activation_distance;
+  if (setup.proxy) frame.proxy = {&data.proxy_x, &setup.proxy->edges, &setup.proxy->triangles};
+  observer(frame);
 }
 
 template <int Dim>

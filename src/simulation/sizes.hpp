@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "itr/mesh/mesh.hpp"
+#include "itr/mesh.hpp"
 
 namespace itr {
 

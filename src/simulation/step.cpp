@@ -15,6 +15,7 @@
 
 #include "core/check.hpp"
 #include "core/process.hpp"
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "newton/round_off.hpp"
 #include "simulation/chord_bound.hpp"
@@ -201,6 +202,7 @@ class StepSolver {
     next_.created_energy = guard_.created_energy();
     {
       const ScopedTimer timer(report_.seconds.assembly);
+      const auto phase = ScopedPhase::coarse("report");
       if (!setup_.remesh.enabled || !renumbering_.empty()) report_.energy = problem_->report(x_);
       if (!setup_.remesh.enabled) report_.energy_before_remesh = report_.energy.total;
       report_.vertices = next_.mesh.num_vertices();
@@ -302,6 +304,7 @@ class StepSolver {
 
   void make_problem() {
     const ScopedTimer timer(report_.seconds.assembly);
+    const auto phase = ScopedPhase::coarse("problem");
     problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness,
                                                   next_.quadrature, next_.chords);
   }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "itr/core/log.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "itr/core.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step_ladder.hpp"
 #include "simulation/step_problem.hpp"
 

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/core/types.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
 

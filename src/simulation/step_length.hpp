@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 
 namespace itr {
 

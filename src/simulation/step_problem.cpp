@@ -10,8 +10,8 @@
 
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
-#include "itr/core/error.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "geometry/quadratic_validity.hpp"
+#include "itr/core.hpp"
 #include "newton/curvature.hpp"
 
 namespace itr {

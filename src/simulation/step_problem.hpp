@@ -4,15 +4,15 @@
 
 #include <memory>
 
+#include "energy/contact/stiffness.hpp"
+#include "energy/incremental_potential.hpp"
 #include "energy/least_motion.hpp"
-#include "itr/energy/contact/stiffness.hpp"
-#include "itr/energy/incremental_potential.hpp"
-#include "itr/newton/newton.hpp"
-#include "itr/simulation/frame.hpp"
-#include "itr/simulation/setup.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/frame.hpp"
+#include "itr/setup.hpp"
+#include "newton/newton.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/step_terms.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "mesh/rest_box.hpp"
 
 namespace itr {

@@ -5,10 +5,10 @@
 #include <map>
 #include <vector>
 
+#include "energy/terms.hpp"
 #include "fem/held_rule.hpp"
-#include "itr/energy/terms.hpp"
-#include "itr/simulation/setup.hpp"
-#include "itr/time/integrator.hpp"
+#include "itr/setup.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "itr/simulation/setup.hpp"
+#include "itr/setup.hpp"
 #include "simulation/step.hpp"
 
 namespace itr {

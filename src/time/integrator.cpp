@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/time/integrator.hpp"
+#include "time/integrator.hpp"
 
 #include <algorithm>
 #include <array>

@@ -2,8 +2,8 @@
 // Embeds the library: fills in a Setup by hand, steps it, and reads the reports. A unit square falls freely for one second.
 #include <cmath>
 #include <cstdio>
-#include <itr/linear/registry.hpp>
-#include <itr/simulation/simulation.hpp>
+#include <itr/simulation.hpp>
+#include <itr/solver.hpp>
 
 namespace {
 
@@ -40,6 +40,6 @@ int main(int argc, char** argv) {
   double height = 0;
   simulation.observe([&](const itr::FrameView<2>& frame) { height = frame.x[1]; });
   const double expected = -kGravity * kStep * kStep * kSteps * (kSteps + 1) / 2;  // implicit Euler from rest
-  std::printf("t = %g s, height %.9g m, expected %.9g m\n", simulation.state().t, height, expected);
+  std::printf("t = %g s, height %.9g m, expected %.9g m\n", simulation.time(), height, expected);
   return std::abs(height - expected) < 1e-8 ? 0 : 1;
 }

@@ -31,9 +31,7 @@ file(GLOB_RECURSE installed RELATIVE ${WORK_DIR}/prefix/include ${WORK_DIR}/pref
 if(NOT headers STREQUAL installed)
   message(FATAL_ERROR "include/ has\n${headers}\nand these are installed:\n${installed}")
 endif()
-if(EXISTS ${WORK_DIR}/consumer/shared_consumer)
-  run(${WORK_DIR}/consumer/shared_consumer)
-endif()
+run(${WORK_DIR}/consumer/shared_consumer)
 
 # Where program and command look for modules: in their prefix, wherever the build tree was.
 file(GLOB modules ${WORK_DIR}/prefix/lib*/itr/backends/itr_backend_cholmod.so

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "itr/energy/elastic/neo_hookean.hpp"
+#include "energy/elastic/neo_hookean.hpp"
 #include "random_tets.hpp"
 #include "square_mesh.hpp"
 

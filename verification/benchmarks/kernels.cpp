@@ -8,14 +8,14 @@
 #include <algorithm>
 #include <random>
 
+#include "core/parallel.hpp"
+#include "energy/contact/contact.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
 #include "geometry/ccd.hpp"
 #include "geometry/intersection.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/contact/contact.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/mesh/mesh.hpp"
-#include "itr/newton/newton.hpp"
+#include "itr/mesh.hpp"
+#include "newton/newton.hpp"
 #include "projection/transfer_patch.hpp"
 
 namespace {

@@ -18,8 +18,8 @@
 #include "apps/itr/ranks.hpp"
 #include "core/timer.hpp"
 #include "dump.hpp"
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 
 namespace {
 

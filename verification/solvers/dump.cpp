@@ -12,9 +12,9 @@
 #include <type_traits>
 #include <utility>
 
-#include "itr/core/error.hpp"
-#include "itr/linear/reuse.hpp"
+#include "itr/core.hpp"
 #include "linear/forwarding.hpp"
+#include "linear/reuse.hpp"
 
 namespace itr::linear {
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "itr/linear/solver.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::linear {
 

@@ -17,10 +17,10 @@
 
 #include "core/timer.hpp"
 #include "dump.hpp"
-#include "itr/core/error.hpp"
-#include "itr/core/types.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/linear/reuse.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
+#include "itr/types.hpp"
+#include "linear/reuse.hpp"
 
 namespace {
 

@@ -12,12 +12,12 @@
 #include <map>
 #include <string>
 
-#include "itr/core/error.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/inertia.hpp"
-#include "itr/energy/load.hpp"
-#include "itr/projection/transfer.hpp"
-#include "itr/scene/scene.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/inertia.hpp"
+#include "energy/load.hpp"
+#include "itr/core.hpp"
+#include "itr/scene.hpp"
+#include "itr/transfer.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/report/report.hpp"
-#include "itr/linear/registry.hpp"
-#include "itr/scene/scene.hpp"
+#include "itr/scene.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::cli {
 
@@ -21,6 +21,7 @@ struct RunOptions {
   bool resume = false;         ///< go on from the newest saved state of the folder, if there is one
   bool allow_changes = false;  ///< then also with another solver, other tolerances, step cuts
   bool overwrite = false;      ///< replace what the folder has
+  bool profile = false;        ///< the folder gets profile.jsonl
   bool report = false;         ///< at the end, finished or not, the folder gets report.html
 };
 

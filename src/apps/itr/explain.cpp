@@ -10,14 +10,14 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "itr/core/error.hpp"
-#include "itr/fem/quadrature.hpp"
-#include "itr/simulation/simulation.hpp"
+#include "fem/quadrature.hpp"
+#include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "mesh/connected_parts.hpp"
 #include "mesh/rest_box.hpp"
 #include "simulation/advice.hpp"
 #include "simulation/barrier_stiffness.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr::cli {

@@ -15,8 +15,8 @@
 #include <thread>
 
 #include "commands.hpp"
-#include "itr/core/error.hpp"
-#include "itr/linear/registry.hpp"
+#include "itr/core.hpp"
+#include "itr/solver.hpp"
 #include "itr_commit.hpp"
 #include "linear/modules.hpp"
 #include "output/certify.hpp"
@@ -180,6 +180,7 @@ int dispatch(int argc, char** argv) {
   bool as_page = false, as_json = false;
   auto* run = app.add_subcommand("run", "simulate a scene");
   add_scene_options(*run, options, sets);
+  run->add_flag("--profile", options.profile, "write where the time of each step goes into profile.jsonl");
   run->add_flag("--report", options.report, "at the end, write report.html into the folder: see `itr report`");
   auto* explain = app.add_subcommand("explain", "say what would be modelled and why; runs nothing; takes options of run");
   add_scene_options(*explain, options, sets);

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "itr/linear/registry.hpp"
+#include "itr/solver.hpp"
 
 namespace itr::cli {
 

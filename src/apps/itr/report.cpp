@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "output/file_list.hpp"
 
 namespace itr::cli {

@@ -18,11 +18,13 @@
 #include <thread>
 #include <utility>
 
+#include "core/parallel.hpp"
+#include "core/profile.hpp"
 #include "core/timer.hpp"
-#include "itr/core/error.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/output/writer.hpp"
+#include "itr/core.hpp"
+#include "itr/output.hpp"
 #include "output/force_file.hpp"
+#include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
 #include "simulation/advice.hpp"
@@ -223,6 +225,7 @@ template <int Dim>
 std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
   std::vector<std::string> names;
   if (!setup.fields.curves.empty()) names.emplace_back(output::kForceFile);
+  if (options.profile) names.emplace_back(output::kProfileFile);
   if (options.report) names.emplace_back(kReportFile);
   return names;
 }
@@ -259,13 +262,14 @@ class Run {
     writer_ = saved
                   ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
                   : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
+    if (options.profile) profile_.emplace(directory_, threads);
     warnings.set_writer(writer_.get());
     if (const int count = writer_->removed_files(); count > 0)
       spdlog::info("removed from {}: {} files of {}", directory_, count,
                    saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
     is_saved_ = saved.has_value();
     if (saved)
-      spdlog::info("going on after step {}", simulation_.state().step);
+      spdlog::info("going on after step {}", simulation_.steps());
     else
       write(simulation_.report());
   }
@@ -283,13 +287,12 @@ class Run {
       writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
       const std::string of_output =
-          fmt::format("step {}, whose files could not all be written: {}", simulation_.state().step, error.what());
+          fmt::format("step {}, whose files could not all be written: {}", simulation_.steps(), error.what());
       outcome = outcome.empty() || outcome == kFinished ? "stopped at " + of_output : outcome + "; and at " + of_output;
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     const bool is_finished = outcome == kFinished;
-    if (is_finished)
-      fmt::print("{} steps in {}: {}\n", simulation_.state().step, directory_, describe_solves(writer_->totals()));
+    if (is_finished) fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
     if (is_finished) tell_remeshing();
     count_warnings();
     if (with_report_) write_report();
@@ -317,7 +320,7 @@ class Run {
   output::Checkpoint<Dim> restore(output::SavedState saved, const scene::Scene& scene, const RunOptions& options) {
     output::Checkpoint<Dim> checkpoint = read_whole(saved, scene, options);
     try {
-      simulation_.restore(checkpoint.state);
+      simulation_.restore(*checkpoint.state);
     } catch (const InputError& error) {  // older states would fit no better, and their steps would replace good results
       throw InputError({saved.file.string(), error.parts().place, error.parts().found, error.parts().expected});
     }
@@ -393,21 +396,21 @@ class Run {
           return failed;
         }
       }();
-      if (!result.ok && stop_now)
-        return fmt::format("interrupted in step {}, which is dropped", simulation_.state().step + 1);
+      if (!result.ok && stop_now) return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
             "--allow-changes and --set /time/step_cuts=8 (smaller steps where one fails), more "
             "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
             directory_);
-        return fmt::format("stopped in step {} (t = {}): {}", simulation_.state().step + 1,
-                           units.text(simulation_.state().t + simulation_.setup().time.dt, "s", 6), result.reason);
+        return fmt::format("stopped in step {} (t = {}): {}", simulation_.steps() + 1,
+                           units.text(simulation_.time() + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
+      if (profile_) profile_->add(result.report.step);
       ++steps_done_;
       show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
-      if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.state().step);
+      if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.steps());
     }
     return kFinished;
   }
@@ -425,8 +428,9 @@ class Run {
     report.seconds.total += output_seconds_;
     output_seconds_ = 0;
     const ScopedTimer timer(output_seconds_);
+    const auto phase = ScopedPhase::coarse("output");
     const State<Dim>& state = simulation_.state();
-    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(state.step);
+    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps());
     simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
   }
 
@@ -438,6 +442,7 @@ class Run {
   bool with_report_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
+  std::optional<output::ProfileFile> profile_;
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "scene/node.hpp"
 

@@ -7,7 +7,7 @@
 #include "deflate.hpp"
 #include "gap.hpp"
 #include "geometry/measures.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 
 namespace itr::report {
 

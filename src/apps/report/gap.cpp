@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "geometry/bvh.hpp"
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 #include "mesh/connected_parts.hpp"
 
 namespace itr::report {

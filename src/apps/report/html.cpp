@@ -7,7 +7,7 @@
 #include "core/read_file.hpp"
 #include "deflate.hpp"
 #include "frames.hpp"
-#include "itr/core/error.hpp"
+#include "itr/core.hpp"
 #include "output/certify.hpp"
 #include "output/file_list.hpp"
 #include "output/files.hpp"

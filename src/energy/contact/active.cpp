@@ -9,8 +9,8 @@
 #include <tuple>
 
 #include "candidates.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/energy/contact/contact.hpp"
+#include "core/parallel.hpp"
+#include "energy/contact/contact.hpp"
 
 namespace itr {
 

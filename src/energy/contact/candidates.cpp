@@ -5,7 +5,8 @@
 #include <atomic>
 #include <tuple>
 
-#include "itr/core/parallel.hpp"
+#include "core/parallel.hpp"
+#include "core/profile.hpp"
 
 namespace itr {
 
@@ -245,6 +246,7 @@ std::size_t ContactCandidates<Dim>::most_now(const CollisionSurface& surface) co
 template <int Dim>
 double ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
                                       KeptVector& part, double longest) {
+  const ScopedPhase phase("candidates");
   if (longest == 1 && hold(surface, x, &dx, reach, most_now(surface))) return 1;
   return search_part(surface, x, dx, reach, part, std::min(longest, 0.5));
 }

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/kept_vector.hpp"
+#include "energy/contact/surface.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/core/kept_vector.hpp"
-#include "itr/energy/contact/surface.hpp"
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 namespace itr {
 

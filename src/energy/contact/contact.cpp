@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/contact/contact.hpp"
+#include "energy/contact/contact.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -10,9 +10,9 @@
 #include <limits>
 
 #include "candidates.hpp"
+#include "core/kept_vector.hpp"
 #include "core/parallel_reduce.hpp"
 #include "geometry/ccd.hpp"
-#include "itr/core/kept_vector.hpp"
 #include "pairs.hpp"
 
 namespace itr {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // f0(y) = y^2 (1 - y / (3 eps)) / eps + eps / 3 below eps, y above: the potential whose derivative f1 rises smoothly from 0
 // to 1 over the slip speeds below eps (IPC, Li et al. 2020, eq. 15).
-#include "itr/energy/contact/friction.hpp"
+#include "energy/contact/friction.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>

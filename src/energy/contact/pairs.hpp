@@ -4,9 +4,9 @@
 
 #include <array>
 
+#include "energy/contact/surface.hpp"
 #include "geometry/bvh.hpp"
-#include "itr/energy/contact/surface.hpp"
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/contact/stiffness.hpp"
+#include "energy/contact/stiffness.hpp"
 
 #include <algorithm>
 #include <cmath>

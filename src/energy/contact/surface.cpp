@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/contact/surface.hpp"
+#include "energy/contact/surface.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -125,6 +125,15 @@ CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, s
   return surface;
 }
 
+template <int Dim>
+std::shared_ptr<const CollisionSurface> collision_surface(std::vector<std::array<int, 2>> edges,
+                                                          std::vector<std::array<int, 3>> triangles,
+                                                          std::span<const int> points, std::span<const Vec<Dim>> rest,
+                                                          std::vector<char> counts) {
+  return std::make_shared<const CollisionSurface>(
+      make_collision_surface(std::move(edges), std::move(triangles), points, rest, std::move(counts)));
+}
+
 template <>
 std::vector<std::array<int, 2>> find_intersections<2>(const CollisionSurface& surface, ConstVectorView x, std::size_t most) {
   return find_intersections(x, surface.edges, surface.counts, most, surface.closed);
@@ -138,7 +147,10 @@ std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& su
   template void complete_collision_surface<Dim>(CollisionSurface&, std::span<const int>, std::span<const Vec<Dim>>);      \
   template CollisionSurface make_collision_surface<Dim>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, \
                                                         std::span<const int>, std::span<const Vec<Dim>>,                  \
-                                                        std::vector<char>);
+                                                        std::vector<char>);                                               \
+  template std::shared_ptr<const CollisionSurface> collision_surface<Dim>(                                                \
+      std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, std::span<const int>, std::span<const Vec<Dim>>,  \
+      std::vector<char>);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/energy/contact/surface.hpp"
+#include "energy/contact/surface.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/elastic/elastic.hpp"
+#include "energy/elastic/elastic.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>

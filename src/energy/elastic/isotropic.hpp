@@ -3,7 +3,7 @@
 // the eigensystem of d2W/dF2 (after Smith et al. 2019, "Analytic eigensystems for isotropic distortion energies").
 #pragma once
 
-#include "itr/energy/elastic/laws.hpp"
+#include "energy/elastic/laws.hpp"
 
 namespace itr {
 

@@ -12,8 +12,8 @@
 
 #include <vector>
 
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/elastic/laws.hpp"
+#include "fem/cell_set.hpp"
 
 namespace itr {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "itr/energy/elastic/laws.hpp"
+#include "energy/elastic/laws.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>

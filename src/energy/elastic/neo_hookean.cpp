@@ -2,7 +2,7 @@
 // With F = U diag(s) V^T and dF = U A V^T, the second derivative is mu A + c S^-1 A^T S^-1 + lambda (S^-1 : A) S^-1, where
 // c = mu - lambda ln J. Diagonal entries of A decouple from the others; each pair (A_ij, A_ji) has one symmetric and one
 // skew mode (Smith et al. 2019, "Analytic eigensystems for isotropic distortion energies").
-#include "itr/energy/elastic/neo_hookean.hpp"
+#include "energy/elastic/neo_hookean.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>

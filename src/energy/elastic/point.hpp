@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/fem/cell_set.hpp"
+#include "energy/elastic/laws.hpp"
+#include "fem/cell_set.hpp"
 #include "strain.hpp"
 
 namespace itr {

@@ -10,18 +10,20 @@
 #include <vector>
 
 #include "core/parallel_reduce.hpp"
+#include "elastic.hpp"
+#include "energy/elastic/elastic.hpp"
+#include "energy/elastic/laws.hpp"
+#include "energy/energy.hpp"
 #include "energy/project_block.hpp"
+#include "energy/step_limit.hpp"
+#include "fem/cell_set.hpp"
 #include "fem/displacement.hpp"
-#include "itr/core/types.hpp"
-#include "itr/energy/elastic/elastic.hpp"
-#include "itr/energy/elastic/laws.hpp"
-#include "itr/energy/elastic/neo_hookean.hpp"
-#include "itr/energy/energy.hpp"
-#include "itr/energy/step_limit.hpp"
-#include "itr/fem/cell_set.hpp"
-#include "itr/fem/quadrature.hpp"
-#include "itr/geometry/quadratic_validity.hpp"
+#include "fem/quadrature.hpp"
+#include "geometry/quadratic_validity.hpp"
+#include "itr/types.hpp"
 #include "jacobian_barrier.hpp"
+#include "laws.hpp"
+#include "neo_hookean.hpp"
 
 namespace itr {
 

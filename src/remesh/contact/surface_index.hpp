@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "geometry/bvh.hpp"
+#include "geometry/distance.hpp"
 #include "geometry/dynamic_tree.hpp"
-#include "itr/geometry/distance.hpp"
-#include "itr/mesh/mesh.hpp"
-#include "itr/remesh/fields.hpp"
+#include "itr/mesh.hpp"
+#include "remesh/fields.hpp"
 
 namespace itr {
 

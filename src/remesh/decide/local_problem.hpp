@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include "itr/energy/incremental_potential.hpp"
-#include "itr/newton/newton.hpp"
-#include "itr/remesh/fields.hpp"
+#include "energy/incremental_potential.hpp"
+#include "newton/newton.hpp"
 #include "remesh/contact/contact_reach.hpp"
 #include "remesh/contact/gate.hpp"
+#include "remesh/fields.hpp"
 #include "remesh/marks.hpp"
 
 namespace itr {

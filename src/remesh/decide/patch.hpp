@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "itr/mesh/mesh.hpp"
-#include "itr/remesh/options.hpp"
+#include "itr/mesh.hpp"
+#include "itr/options.hpp"
 #include "remesh/marks.hpp"
 
 namespace itr {

@@ -3,8 +3,8 @@
 // set up.
 #pragma once
 
-#include "itr/mesh/mesh.hpp"
-#include "itr/remesh/fields.hpp"
+#include "itr/mesh.hpp"
+#include "remesh/fields.hpp"
 
 namespace itr {
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <boost/container/small_vector.hpp>
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "fem/chords.hpp"
 #include "prospect.hpp"
@@ -243,6 +244,7 @@ double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) 
 template <int Dim>
 void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
   const ScopedTimer timer(trial.seconds);
+  const auto phase = ScopedPhase::coarse("local trials");
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <boost/container/small_vector.hpp>
 #include "edit_checks.hpp"
-#include "itr/fem/quadratic.hpp"
+#include "fem/quadratic.hpp"
 
 namespace itr {
 

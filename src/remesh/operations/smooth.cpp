@@ -5,8 +5,8 @@
 #include <limits>
 #include <optional>
 
+#include "energy/elastic/laws.hpp"
 #include "geometry/measures.hpp"
-#include "itr/energy/elastic/laws.hpp"
 #include "remesh/curved_cell.hpp"
 #include "remesh/edits.hpp"
 #include "remesh/schedule/pipeline.hpp"

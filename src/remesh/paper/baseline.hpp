@@ -6,8 +6,8 @@
 #include <memory>
 #include <unordered_map>
 
-#include "itr/mesh/mesh.hpp"
-#include "itr/remesh/options.hpp"
+#include "itr/mesh.hpp"
+#include "itr/options.hpp"
 
 namespace itr {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "itr/geometry/distance.hpp"
+#include "geometry/distance.hpp"
 #include "remesh/edits/edit_checks.hpp"
 #include "remesh/schedule/session.hpp"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "itr/remesh/candidate.hpp"
+#include "remesh/candidate.hpp"
 #include "remesh/decide/local_problem.hpp"
 
 namespace itr {

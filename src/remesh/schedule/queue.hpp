@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "itr/remesh/candidate.hpp"
+#include "remesh/candidate.hpp"
 
 namespace itr {
 

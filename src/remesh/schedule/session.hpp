@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "change_log.hpp"
-#include "itr/core/parallel.hpp"
-#include "itr/mesh/strata.hpp"
-#include "itr/remesh/memory.hpp"
-#include "itr/remesh/remesher.hpp"
-#include "itr/remesh/report.hpp"
+#include "core/parallel.hpp"
+#include "core/profile.hpp"
+#include "mesh/strata.hpp"
 #include "remesh/decide/queries.hpp"
+#include "remesh/memory.hpp"
 #include "remesh/paper/baseline.hpp"
+#include "remesh/remesher.hpp"
+#include "remesh/report.hpp"
 
 namespace itr {
 
@@ -98,8 +99,10 @@ class RemeshSession {
   template <typename F>
   void for_each(std::size_t n, const F& f) {
     std::atomic<std::size_t> next = 0;
+    const auto phase = ScopedPhase::coarse("local trials");
+    LoopTimer timer;
     parallel_blocks(std::min(n, lanes_.size()), 1, [&](std::size_t lane, std::size_t) {
-      for (std::size_t i = next++; i < n; i = next++) f(i, lanes_[lane]);
+      for (std::size_t i = next++; i < n; i = next++) timer.run([&] { f(i, lanes_[lane]); });
     });
   }
   /// For calls from the thread that owns this.

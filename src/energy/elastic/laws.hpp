@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// Stored-energy densities W(F) of all laws, F = dx/dX of det F = J > 0, d the dimension (docs/theory.md, "Materials"):
+//   neo-Hookean             mu/2 (tr F^T F - d - 2 ln J) + lambda/2 (ln J)^2
+//   linear                  mu e:e + lambda/2 (tr e)^2,  e = (F + F^T)/2 - I
+//   St. Venant-Kirchhoff    mu E:E + lambda/2 (tr E)^2,  E = (F^T F - I)/2
+//   fixed corotated         mu sum (s_i - 1)^2 + lambda/2 (J - 1)^2,  s_i the singular values of F
+//   Mooney-Rivlin           c1 (I1 - d) + c2 (I2 - d) + c3 (I1 - d)(I2 - d) + k/2 (ln J)^2 + D (J - 1)^2,
+//                           I1, I2 the invariants of J^(-2/d) F F^T; the constant that makes W(I) = 0 is left out
+// Only the first is infinite at J = 0; the state's own rule, no inverted cell, holds for all of them.
+#pragma once
+
+#include "energy/elastic/neo_hookean.hpp"
+#include "itr/options.hpp"
+
+namespace itr {
+
+/// A law with its moduli at one place.
+struct ElasticModuli {
+  MaterialLaw law = MaterialLaw::neo_hookean;
+  LameParameters lame{};
+  MooneyRivlinModuli mooney_rivlin{};
+  const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
+};
+
+/// Moduli of a material at rest position X.
+template <int Dim>
+ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X);
+/// Density [kg/m^Dim] of a material at rest position X.
+template <int Dim>
+double mass_density(const Material& material, const Vec<Dim>& X);
+
+/// G = F - I = du/dX. Densities and stresses are computed from it, because F itself rounds small strains away.
+template <int Dim>
+struct DisplacementGradient {
+  Mat<Dim> G;
+  static DisplacementGradient of(const Mat<Dim>& F) { return {F - Mat<Dim>::Identity()}; }
+  Mat<Dim> F() const { return G + Mat<Dim>::Identity(); }
+};
+
+/// W [J/m^Dim]; +infinity where det F <= 0.
+template <int Dim>
+double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli);
+template <int Dim>
+double elastic_density(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  return elastic_density<Dim>(DisplacementGradient<Dim>::of(F), moduli);
+}
+/// First Piola-Kirchhoff stress dW/dF [Pa].
+template <int Dim>
+Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli);
+template <int Dim>
+Mat<Dim> elastic_stress(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  return elastic_stress<Dim>(DisplacementGradient<Dim>::of(F), moduli);
+}
+/// The exact Hessian d2W/dF2 by eigenvalues and modes; leaving out negative values projects it.
+template <int Dim>
+EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli);
+
+}  // namespace itr

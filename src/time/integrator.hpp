@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Implicit time integrators as minimisation: predictor x-hat, scaling alpha h^2, and how velocity and acceleration follow
+// from new positions (docs/theory.md, "Time").
+#pragma once
+
+#include <vector>
+
+#include "itr/options.hpp"
+#include "itr/types.hpp"
+
+namespace itr {
+
+/// Past states, newest first; interleaved fields of one mesh.
+struct History {
+  std::vector<VectorX> x;  ///< [m]
+  std::vector<VectorX> v;  ///< [m/s]
+  std::vector<VectorX> a;  ///< [m/s^2]
+  /// Newmark only: the next step is one of implicit Euler, which dissipates (see TimeOptions::energy_growth_limit).
+  bool damp_next = false;
+};
+
+class TimeIntegrator {
+ public:
+  explicit TimeIntegrator(const TimeOptions& options) : options_(options) {}
+
+  /// How many past states the next step uses: BDF starts with order 1 and grows as states become available.
+  int order(const History& history) const;
+  /// Order of accuracy of the next step's velocities: 0 in statics, 1 for implicit Euler and the first step of BDF.
+  int accuracy(const History& history) const;
+  /// How many past states need to be kept.
+  int depth() const;
+  /// Whether the next step is one of the trapezoidal rule: no dissipation, so a bad step can create energy.
+  bool is_trapezoidal(const History& history) const;
+  bool uses_acceleration() const { return options_.integrator == Integrator::newmark; }
+
+  /// x-hat: where the body flies without forces [m].
+  VectorX predictor(const History& history) const;
+  /// x-hat minus the newest positions, without the round-off of positions [m].
+  VectorX predicted_increment(const History& history) const;
+  /// alpha h^2 [s^2]; 1 for statics.
+  double scaling(const History& history) const;
+  /// dv/dx [1/s].
+  double velocity_rate(const History& history) const;
+  /// The positions at which the velocity would vanish: v = velocity_rate * (x - reference).
+  VectorX velocity_reference(const History& history) const;
+
+  /// Velocity at the positions x.
+  VectorX velocity(const VectorX& x, const History& history) const;
+  /// Velocity at the newest positions plus `increment`, without the round-off of positions.
+  VectorX velocity_after(const VectorX& increment, const History& history) const;
+  VectorX acceleration(const VectorX& v, const History& history) const;
+  /// Makes x the newest state; `increment` is x minus the newest positions, before it was rounded.
+  void push(VectorX x, const VectorX& increment, History& history) const;
+  void push(const VectorX& x, History& history) const { push(x, x - history.x[0], history); }
+
+ private:
+  bool is_newmark(const History& history) const;
+  VectorX reference_increment(const History& history) const;
+
+  TimeOptions options_;
+};
+
+}  // namespace itr
