@@ -70,7 +70,7 @@ void add_table(Setup<Dim>& setup) {
     table.triangles = {{0, 2, 1}, {0, 3, 2}};
   }
   table.motion.assign(table.rest.size(), kNone);
-  setup.contact = {.enabled = true, .activation_distance = dhat, .convergent = true, .barrier_stiffness = 1e6};
+  setup.contact = {.enabled = true, .dhat = dhat, .convergent = true, .barrier_stiffness = 1e6};
 }
 
 /// The block as it lands on the table, at 2 m/s along it.

@@ -21,7 +21,7 @@ struct Sheets {
   ContactOptions options;
   explicit Sheets(bool is_obstacle, int side = 14) : x(2 * side * side * 3) {
     options.enabled = options.convergent = true;
-    options.activation_distance = 0.3;
+    options.dhat = 0.3;
     std::mt19937 random(7);
     std::uniform_real_distribution<double> noise(-0.1, 0.1);
     std::vector<Vec<3>> rest;
@@ -47,7 +47,7 @@ TEST(Candidates, AreOfTheReachThatTheyWereFoundFor) {
   const Sheets scene(false);
   const auto value_at = [&](double dhat, Workspace& workspace) {
     ContactOptions options = scene.options;
-    options.activation_distance = dhat;
+    options.dhat = dhat;
     return ContactEnergy<3>(scene.surface, options, 3, 0.5).value(scene.x, workspace);
   };
   Workspace fresh, shared;
@@ -64,11 +64,11 @@ TEST(Candidates, OfVerticesThatLeaveTheirBoxesAreThoseOfAWholeSearch) {
     VectorX x = scene.x;
     ASSERT_GT(contact.active(x, kept).size(), 20u);
     for (const int v : {17, 250, 251, 130, 17, 300}) {  // each goes three cells further, through the other sheet
-      VectorX way = VectorX::Zero(x.size());
-      way.segment<3>(3 * v) << 3, -2, v < 196 ? 0.5 : -0.5;
+      VectorX motion = VectorX::Zero(x.size());
+      motion.segment<3>(3 * v) << 3, -2, v < 196 ? 0.5 : -0.5;
       Workspace fresh;
-      EXPECT_NEAR(contact.max_step(x, way, kept), contact.max_step(x, way, fresh), 1e-12) << "vertex " << v;
-      x += way;
+      EXPECT_NEAR(contact.max_step(x, motion, kept), contact.max_step(x, motion, fresh), 1e-12) << "vertex " << v;
+      x += motion;
       Workspace another;
       const auto& expected = contact.active(x, another);
       const auto& found = contact.active(x, kept);
@@ -120,11 +120,11 @@ TEST_P(FarMotions, HoldFewPairsAndAreFreeAsFarAsTold) {
   EXPECT_LE(pairs_in(workspace), most_);
   EXPECT_FALSE(blocking.pairs.empty());
 
-  VectorX ways(dx.size());
-  EXPECT_TRUE(contact_.get_single_ways(scene_.x, dx, ways, workspace));
+  VectorX steps(dx.size());
+  EXPECT_TRUE(contact_.get_vertex_steps(scene_.x, dx, steps, workspace));
   EXPECT_LE(pairs_in(workspace), most_);
   for (int i = 1; i <= 20; ++i)
-    EXPECT_FALSE(has_intersection<3>(scene_.surface, scene_.x + i / 20.0 * ways)) << "at " << 5 * i << " %";
+    EXPECT_FALSE(has_intersection<3>(scene_.surface, scene_.x + i / 20.0 * steps)) << "at " << 5 * i << " %";
   EXPECT_LE(contact_.step_limit(scene_.x, dx, workspace).step, step * (1 + 1e-12));
 }
 
@@ -133,12 +133,12 @@ TEST_P(FarMotions, HaveTheSameBitsForOneAndThreeThreads) {
   const auto run = [&](int threads) {
     const ThreadLimit limit(threads);
     Workspace workspace;
-    contact_.foresee(scene_.x, dx, workspace);
+    contact_.predict_motion(scene_.x, dx, workspace);
     EXPECT_LE(pairs_in(workspace), most_);
-    VectorX result(dx.size() + 1), ways(dx.size());
+    VectorX result(dx.size() + 1), steps(dx.size());
     result[dx.size()] = contact_.max_step(scene_.x, dx, workspace);
-    contact_.get_single_ways(scene_.x, dx, ways, workspace);
-    result.head(dx.size()) = ways;
+    contact_.get_vertex_steps(scene_.x, dx, steps, workspace);
+    result.head(dx.size()) = steps;
     return result;
   };
   EXPECT_TRUE((run(1).array() == run(3).array()).all());
@@ -168,7 +168,7 @@ TEST(Candidates, OfMotionsMayBeMoreWhereThoseAtRestAreMany) {
   const VectorX dx = VectorX::Constant(scene.x.size(), 100);
   const double reach = 5;
   ContactCandidates<3> candidates;
-  KeptVector part;
+  ScratchVector part;
   candidates.update(scene.surface, scene.x, reach);
   ASSERT_GT(candidates.edge_edges().size(), ContactCandidates<3>::most_pairs(scene.surface));
   EXPECT_GT(candidates.update(scene.surface, scene.x, dx, reach, part) * 100, reach);

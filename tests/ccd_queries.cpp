@@ -44,7 +44,7 @@ struct Tally {
     zeros += other.zeros;
     seconds += other.seconds;
   }
-  double false_positive_share() const { return negatives > 0 ? double(false_positives) / double(negatives) : 0; }
+  double false_positive_fraction() const { return negatives > 0 ? double(false_positives) / double(negatives) : 0; }
 };
 
 /// The queries come from doubles, so numerator and power-of-two denominator are exact in long double and so is the quotient.
@@ -170,7 +170,7 @@ int run_folders(int count, char** folders) {
   const Tally sharp = run_files(files, "sharp", {.min_separation_ratio = kSharp}), product = run_files(files, "product", {});
   const bool wrong = sharp.misses + sharp.zeros + product.misses + product.zeros > 0;
   const bool too_many =
-      sharp.false_positive_share() > kMostFalsePositives[0] || product.false_positive_share() > kMostFalsePositives[1];
+      sharp.false_positive_fraction() > kMostFalsePositives[0] || product.false_positive_fraction() > kMostFalsePositives[1];
   return wrong || too_many ? 1 : 0;
 }
 

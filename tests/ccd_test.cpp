@@ -19,8 +19,8 @@ class EdgeCcd : public ::testing::Test {};
 using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
 TYPED_TEST_SUITE(EdgeCcd, Dimensions);
 
-/// Share of the distance at the start that is kept until a collision, and by points that pass by.
-double least_share(double time) { return time < 1 ? CcdOptions{}.min_separation_ratio : CcdOptions{}.passing_ratio; }
+/// Fraction of the distance at the start that is kept until a collision, and by points that pass by.
+double least_fraction(double time) { return time < 1 ? CcdOptions{}.min_separation_ratio : CcdOptions{}.passing_ratio; }
 
 TYPED_TEST(EdgeCcd, CollisionTimesAreNeverLateAndNeverZero) {
   constexpr int Dim = TypeParam::value;
@@ -47,7 +47,7 @@ TYPED_TEST(EdgeCcd, CollisionTimesAreNeverLateAndNeverZero) {
     for (int k = 0; k <= 200; ++k) {
       const double t = toi * k / 200;
       const Vec<Dim> q = p[0] + t * (p[1] - p[0]), c = a[0] + t * (a[1] - a[0]), d = b[0] + t * (b[1] - b[0]);
-      EXPECT_GE(std::sqrt(point_edge_distance_squared<Dim>(q, c, d)), least_share(toi) * start * (1 - 1e-9)) << i;
+      EXPECT_GE(std::sqrt(point_edge_distance_squared<Dim>(q, c, d)), least_fraction(toi) * start * (1 - 1e-9)) << i;
     }
   }
   EXPECT_GT(collisions, 50);
@@ -70,7 +70,7 @@ TEST(Ccd, IsNeverLateAndNeverZeroFor3DPairs) {
                                                        : edge_edge_ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);
       EXPECT_GT(toi, 0);
       collisions += toi < 1;
-      for (int k = 0; k <= 100; ++k) EXPECT_GE(now(toi * k / 100), least_share(toi) * now(0) * (1 - 1e-9)) << i;
+      for (int k = 0; k <= 100; ++k) EXPECT_GE(now(toi * k / 100), least_fraction(toi) * now(0) * (1 - 1e-9)) << i;
     }
   EXPECT_GT(collisions, 100);
 }
@@ -108,8 +108,8 @@ std::array<Vec<3>, 4> after_steps_together(std::array<Vec<3>, 4> x, const std::a
   for (int i = 0; i < times; ++i) {
     std::array<Vec<3>, 4> y;
     for (int k = 0; k < 4; ++k) y[k] = x[k] + motion[k];
-    const double share = ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], CcdOptions{});
-    for (int k = 0; k < 4; ++k) x[k] += share * motion[k];
+    const double fraction = ccd(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], CcdOptions{});
+    for (int k = 0; k < 4; ++k) x[k] += fraction * motion[k];
   }
   return x;
 }

@@ -85,8 +85,8 @@ TYPED_TEST(CellModelTest, IsTheSumOfTheTerms) {
     const MatrixX hessian = hessian_of(sum, x, PsdProjection::none);
 
     const auto nodes = element.nodes();
-    PlacedCell<Dim> placed{.rest = {}, .curved = element.curved, .x = at_nodes<Dim>(nodes, x), .way = {}, .level = 0};
-    placed.way = placed.x - at_nodes<Dim>(nodes, predictor);
+    PlacedCell<Dim> placed{.rest = {}, .curved = element.curved, .x = at_nodes<Dim>(nodes, x), .step = {}, .level = 0};
+    placed.step = placed.x - at_nodes<Dim>(nodes, predictor);
     for (int k = 0; k <= Dim; ++k) placed.rest[k] = cells.rest[nodes[k]];
     auto places = CellModel<Dim>::still();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)

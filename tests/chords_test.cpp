@@ -43,7 +43,7 @@ Setup<Dim> pressed_ball(double speed, int steps) {
   setup.materials[1] = {.youngs_modulus = 1e5, .poisson_ratio = 0.4, .density = 100};
   setup.time = {.integrator = Integrator::bdf, .bdf_order = 2, .dt = 0.01, .steps = steps};
   setup.contact = {.enabled = true,
-                   .activation_distance = Dim == 2 ? 2e-3 : 1e-2,
+                   .dhat = Dim == 2 ? 2e-3 : 1e-2,
                    .convergent = true,
                    .barrier_stiffness = 1e4,
                    .friction_coefficient = 0.1};
@@ -189,7 +189,7 @@ TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouch) {
     for (const VectorX& x : state.history.x) EXPECT_EQ(find_violation(setup, state.mesh, x, levels), "");
     if (2 * state.step == setup.time.steps) other.restore(State<Dim>(state));
   }
-  EXPECT_LT(nearest, setup.contact.activation_distance);
+  EXPECT_LT(nearest, setup.contact.dhat);
   EXPECT_GT(raised, 0);
   EXPECT_GT(joined, 0);
   while (!other.finished()) ASSERT_TRUE(other.advance().ok);

@@ -22,7 +22,7 @@ struct ContactScene {
   VectorX x;
   ContactScene(unsigned seed, bool convergent) {
     options.enabled = true;
-    options.activation_distance = 0.2;
+    options.dhat = 0.2;
     options.convergent = convergent;
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> noise(-0.04, 0.04);
@@ -57,7 +57,7 @@ TEST_P(Contact, DerivativesMatchDifferences) {
 
 /// Exact predicates on the way that CCD leaves of a random motion; returns its share.
 template <int Dim, typename Scene>
-double expect_free_way(const Scene& scene, double deviation, unsigned seed) {
+double expect_free_step(const Scene& scene, double deviation, unsigned seed) {
   const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, deviation);
@@ -75,7 +75,7 @@ double expect_free_way(const Scene& scene, double deviation, unsigned seed) {
 
 TEST_P(Contact, StepIsFreeOfContact) {
   int stopped = 0;
-  for (unsigned seed = 0; seed < 20; ++seed) stopped += expect_free_way<2>(ContactScene(seed, GetParam()), 0.3, seed) < 1;
+  for (unsigned seed = 0; seed < 20; ++seed) stopped += expect_free_step<2>(ContactScene(seed, GetParam()), 0.3, seed) < 1;
   EXPECT_GT(stopped, 10);
 }
 
@@ -88,7 +88,7 @@ TEST(Contact, ConvergentFormCountsOverlappingEdgesOnce) {
     const std::vector<Vec<2>> rest = {{0, 0.05}, {-1, 0}, {corner, 0}, {1, 0}};
     CollisionSurface surface = make_collision_surface<2>({{1, 2}, {2, 3}}, {}, std::vector<int>{0}, rest, {1, 0, 0, 0});
     surface.area = {1, 0, 0, 0};  // only the vertex itself carries weight
-    ContactOptions options{.enabled = true, .activation_distance = 0.1, .convergent = true};
+    ContactOptions options{.enabled = true, .dhat = 0.1, .convergent = true};
     VectorX x(8);
     for (int v = 0; v < 4; ++v) x.segment<2>(2 * v) = rest[v];
     Workspace workspace;
@@ -105,7 +105,7 @@ struct ContactScene3 {
   /// Sheets of n x n vertices: from 8 on pairs are found by trees, and in several blocks.
   ContactScene3(unsigned seed, bool convergent, double angle, double roughness, int n = 4) {
     options.enabled = true;
-    options.activation_distance = 0.2;
+    options.dhat = 0.2;
     options.convergent = convergent;
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> noise(-roughness, roughness);
@@ -145,32 +145,32 @@ TEST_P(Contact, DerivativesMatchDifferencesIn3D) {
 
 TEST_P(Contact, StepIsFreeOfContactIn3D) {
   for (unsigned seed = 0; seed < 6; ++seed)
-    EXPECT_LT(expect_free_way<3>(ContactScene3(seed, GetParam(), 0.2 * seed, 0.02), 0.2, seed), 1);
+    EXPECT_LT(expect_free_step<3>(ContactScene3(seed, GetParam(), 0.2 * seed, 0.02), 0.2, seed), 1);
 }
 
-/// Exact predicates on single ways; returns how many vertices go further than by the step of all.
+/// Exact predicates on vertex steps; returns how many vertices go further than by the step of all.
 template <int Dim, typename Scene>
-int expect_free_single_ways(const Scene& scene, unsigned seed) {
+int expect_free_vertex_steps(const Scene& scene, unsigned seed) {
   const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 0.3);
   const VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
   Workspace workspace;
   const double step = contact.max_step(scene.x, dx, workspace);
-  VectorX ways(dx.size());
-  EXPECT_TRUE(contact.get_single_ways(scene.x, dx, ways, workspace));
+  VectorX steps(dx.size());
+  EXPECT_TRUE(contact.get_vertex_steps(scene.x, dx, steps, workspace));
   for (int i = 1; i <= 20; ++i) {
-    const VectorX x = scene.x + i / 20.0 * ways;
+    const VectorX x = scene.x + i / 20.0 * steps;
     EXPECT_FALSE(has_intersection<Dim>(scene.surface, x)) << "seed " << seed << " at " << 5 * i << " %";
     Workspace fresh;
     EXPECT_GT(contact.min_distance(x, fresh), 0) << "seed " << seed;
   }
   int further = 0;
   for (const int v : scene.surface.vertices) {
-    const double way = dx.segment<Dim>(Dim * v).norm(), share = ways.segment<Dim>(Dim * v).norm() / way;
-    EXPECT_LE((ways.segment<Dim>(Dim * v) - share * dx.segment<Dim>(Dim * v)).norm(), 1e-14 * way);
-    EXPECT_LE(share, 1 + 1e-14);
-    further += share > step;
+    const double motion = dx.segment<Dim>(Dim * v).norm(), fraction = steps.segment<Dim>(Dim * v).norm() / motion;
+    EXPECT_LE((steps.segment<Dim>(Dim * v) - fraction * dx.segment<Dim>(Dim * v)).norm(), 1e-14 * motion);
+    EXPECT_LE(fraction, 1 + 1e-14);
+    further += fraction > step;
   }
   return further;
 }
@@ -178,7 +178,7 @@ int expect_free_single_ways(const Scene& scene, unsigned seed) {
 /// Turns a motion by the bounds of what stops it, each met in turn by the shortest change; returns the shares of it that
 /// were free before and are after.
 template <int Dim, typename Scene>
-std::array<double, 2> turn_by_bounds(const Scene& scene, unsigned seed) {
+std::array<double, 2> project_by_bounds(const Scene& scene, unsigned seed) {
   const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 0.1);
@@ -201,13 +201,13 @@ std::array<double, 2> turn_by_bounds(const Scene& scene, unsigned seed) {
 
 TEST_P(Contact, BoundsOnBlockingPairsFreeTheWay) {
   int blocked = 0, freed = 0;
-  const auto count = [&](const std::array<double, 2>& shares) {
-    blocked += shares[0] < 1;
-    freed += shares[0] < 1 && shares[1] == 1;
+  const auto count = [&](const std::array<double, 2>& fractions) {
+    blocked += fractions[0] < 1;
+    freed += fractions[0] < 1 && fractions[1] == 1;
   };
   for (unsigned seed = 0; seed < 20; ++seed) {
-    count(turn_by_bounds<2>(ContactScene(seed, GetParam()), seed));
-    count(turn_by_bounds<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed));
+    count(project_by_bounds<2>(ContactScene(seed, GetParam()), seed));
+    count(project_by_bounds<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed));
   }
   EXPECT_GT(blocked, 15);
   EXPECT_GT(freed, 0.8 * blocked);
@@ -229,30 +229,30 @@ TEST_P(Contact, SumTellsSingleWaysWhereContactAloneCutsAStep) {
   const auto contact = std::make_shared<ContactEnergy<2>>(scene.surface, scene.options, 3, 0.5);
   const VectorX dx = VectorX::Constant(scene.x.size(), 0.1);
   Workspace workspace;
-  VectorX ways(dx.size()), told(dx.size());
-  EXPECT_TRUE(contact->get_single_ways(scene.x, dx, ways, workspace));
+  VectorX steps(dx.size()), told(dx.size());
+  EXPECT_TRUE(contact->get_vertex_steps(scene.x, dx, steps, workspace));
   for (const double step : {1.0, 0.5})
     for (const bool is_first : {false, true}) {
       EnergySum sum;
       if (is_first) sum.add(std::make_shared<Limit>(step));
       sum.add(contact);
       if (!is_first) sum.add(std::make_shared<Limit>(step));
-      EXPECT_EQ(sum.get_single_ways(scene.x, dx, told, workspace), step == 1);
+      EXPECT_EQ(sum.get_vertex_steps(scene.x, dx, told, workspace), step == 1);
       if (step == 1) {
-        EXPECT_EQ(told, ways);
+        EXPECT_EQ(told, steps);
       }
     }
   EnergySum twice;
   twice.add(contact);
   twice.add(contact);
-  EXPECT_FALSE(twice.get_single_ways(scene.x, dx, told, workspace));
+  EXPECT_FALSE(twice.get_vertex_steps(scene.x, dx, told, workspace));
 }
 
 TEST_P(Contact, SingleWaysAreFreeOfContactAndLonger) {
   int further = 0, further_in_3d = 0;
   for (unsigned seed = 0; seed < 20; ++seed) {
-    further += expect_free_single_ways<2>(ContactScene(seed, GetParam()), seed);
-    further_in_3d += expect_free_single_ways<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed);
+    further += expect_free_vertex_steps<2>(ContactScene(seed, GetParam()), seed);
+    further_in_3d += expect_free_vertex_steps<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed);
   }
   EXPECT_GT(further, 100);
   EXPECT_GT(further_in_3d, 100);
@@ -298,7 +298,7 @@ TEST(Contact3, ConvergentFormCountsOverlappingTrianglesOnce) {
     CollisionSurface surface = make_collision_surface<3>({}, {{1, 2, 5}, {2, 3, 5}, {3, 4, 5}, {4, 1, 5}},
                                                          std::vector<int>{0}, rest, {1, 0, 0, 0, 0, 0});
     surface.area = {1, 0, 0, 0, 0, 0};  // only the vertex itself carries weight
-    ContactOptions options{.enabled = true, .activation_distance = 0.1, .convergent = true};
+    ContactOptions options{.enabled = true, .dhat = 0.1, .convergent = true};
     VectorX x(18);
     for (int v = 0; v < 6; ++v) x.segment<3>(3 * v) = rest[v];
     Workspace workspace;
@@ -316,7 +316,7 @@ TEST(Contact3, ObstaclePointsAndEdgesAreFelt) {
   const std::vector<Vec<3>> rest = {{0, 0, 0.05}, {1, 0, 0.05}, {0, 1, 0.05}, {0.2, -1, 0}, {0.2, 2, 0}, {0.5, 0.25, 0}};
   VectorX x(18);
   for (int v = 0; v < 6; ++v) x.segment<3>(3 * v) = rest[v];
-  const ContactOptions options{.enabled = true, .activation_distance = 0.1};
+  const ContactOptions options{.enabled = true, .dhat = 0.1};
   Workspace workspace;
   const CollisionSurface surface =
       make_collision_surface<3>({{3, 4}}, {{0, 1, 2}}, std::vector<int>{3, 4, 5}, rest, {1, 1, 1, 0, 0, 0});
@@ -461,7 +461,7 @@ TEST(Contact3, HasTheBitsOfAFreshWorkspaceInAnUsedOne) {
     const ContactEnergy<3> contact(scene.surface, scene.options, 3, 0.5);
     const VectorX elsewhere = VectorX::Random(scene.x.size()), dx = 0.3 * VectorX::Random(scene.x.size());
     const auto run = [&](Workspace& workspace) {
-      contact.foresee(scene.x, dx, workspace);
+      contact.predict_motion(scene.x, dx, workspace);
       VectorX result(scene.x.size() + 3);
       VectorX gradient = VectorX::Zero(scene.x.size());
       contact.add_gradient(scene.x, gradient, workspace);
@@ -470,7 +470,7 @@ TEST(Contact3, HasTheBitsOfAFreshWorkspaceInAnUsedOne) {
       return result;
     };
     Workspace fresh, used;
-    contact.foresee(elsewhere, dx, used);
+    contact.predict_motion(elsewhere, dx, used);
     EXPECT_TRUE((run(fresh).array() == run(used).array()).all()) << "seed " << seed;
   }
 }
@@ -525,7 +525,7 @@ TEST(AdaptiveStiffness, BalancesTheBarrierAndStaysInItsBounds) {
 TEST(AdaptiveStiffness, DoublesWhileTinyGapsClose) {
   const std::vector<Vec<2>> rest = {{0, 1}, {-1, 0}, {1, 0}};
   const CollisionSurface surface = make_collision_surface<2>({{1, 2}}, {}, std::vector<int>{0}, rest, {1, 0, 0});
-  const ContactOptions options{.enabled = true, .activation_distance = 0.1};
+  const ContactOptions options{.enabled = true, .dhat = 0.1};
   const AdaptiveStiffness<2> adaptive(surface, options, 1, 1);
   Workspace workspace;
   BarrierStiffness stiffness{.value = 1, .largest = 3};

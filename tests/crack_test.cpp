@@ -153,7 +153,7 @@ MeshRenumbering changed_at_random(Mesh<Dim>& mesh, int edits, std::mt19937& rand
 
 /// Whether cell c of `a` overlaps a cell at v of `b`.
 template <int Dim>
-bool share_volume(const Mesh<Dim>& a, CellId c, const Mesh<Dim>& b, VertexId v) {
+bool fraction_volume(const Mesh<Dim>& a, CellId c, const Mesh<Dim>& b, VertexId v) {
   OverlapIntegrals<Dim> integrals;
   return std::ranges::any_of(b.cells_of(v), [&](CellId d) {
     return integrate_overlap<Dim>(Simplex<Dim>(corners_of(a, c)), Simplex<Dim>(corners_of(b, d)), integrals) &&
@@ -180,7 +180,7 @@ void check_interpolation() {
       const bool is_of_body = std::ranges::any_of(around, [&](CellId c) {
         const auto& cell = before.cell(c);
         return std::ranges::all_of(parents, [&](int p) { return std::ranges::count(cell, p); }) &&
-               share_volume(before, c, mesh, v);
+               fraction_volume(before, c, mesh, v);
       });
       ASSERT_TRUE(is_of_body) << "seed " << seed << ", vertex " << v << " at " << mesh.rest(v).transpose();
     }
@@ -222,12 +222,12 @@ void check_forces() {
       Vec<Dim> moment = Vec<Dim>::Zero();
       bool has_any = false;
       for (VertexId w = 0; w < mesh.node_slots(); ++w) {
-        const double share = -gradient[Dim * w];
-        if (share == 0) continue;
-        sum += share;
-        moment += share * mesh.rest(w);
-        has_any =
-            has_any || std::ranges::any_of(before.cells_of(v), [&](CellId c) { return share_volume(before, c, mesh, w); });
+        const double fraction = -gradient[Dim * w];
+        if (fraction == 0) continue;
+        sum += fraction;
+        moment += fraction * mesh.rest(w);
+        has_any = has_any ||
+                  std::ranges::any_of(before.cells_of(v), [&](CellId c) { return fraction_volume(before, c, mesh, w); });
       }
       ASSERT_NEAR(sum, 1, 1e-12);
       ASSERT_LT((moment - before.rest(v)).norm(), 1e-9);
@@ -437,7 +437,7 @@ void check_closing(bool remeshed) {
                                  }});
     }
     setup.time = {.quasistatic = true, .dt = 1, .steps = 12};
-    setup.contact.activation_distance = 1e-3;
+    setup.contact.dhat = 1e-3;
     setup.remesh.enabled = remeshed;
     Simulation<Dim> with(setup, registry);
     setup.contact.enabled = false;
@@ -452,9 +452,9 @@ void check_closing(bool remeshed) {
       ASSERT_GT(least_opening(with.state()), 0) << "seed " << seed << ", step " << step;
       widest = std::max(widest, least_opening(with.state()));
     }
-    EXPECT_GT(widest, 3 * setup.contact.activation_distance);
-    EXPECT_LT(least_opening(without.state()), -3 * setup.contact.activation_distance);
-    EXPECT_LT(least_opening(with.state()), setup.contact.activation_distance);
+    EXPECT_GT(widest, 3 * setup.contact.dhat);
+    EXPECT_LT(least_opening(without.state()), -3 * setup.contact.dhat);
+    EXPECT_LT(least_opening(with.state()), setup.contact.dhat);
     EXPECT_GT(result.report.energy.contact, 0);
   }
 }
@@ -475,7 +475,7 @@ itr::Setup<2> two_squares(double gap, double acceleration) {
   setup.time.steps = 20;
   setup.time.integrator = Integrator::implicit_euler;
   setup.contact.enabled = true;
-  setup.contact.activation_distance = 1e-3;
+  setup.contact.dhat = 1e-3;
   return setup;
 }
 

@@ -28,7 +28,7 @@ Mesh<Dim> cut(const Mesh<Dim>& mesh, const std::set<typename MeshTypes<Dim>::Fac
   for (VertexId v = 0; v < mesh.node_slots(); ++v) {
     const auto around = mesh.cells_of(v);
     std::vector<int> group(around.size(), kNone);
-    const auto share = [&](CellId a, CellId b) {
+    const auto fraction = [&](CellId a, CellId b) {
       std::vector<int> common;
       for (const int w : mesh.cell(a))
         if (std::ranges::count(mesh.cell(b), w)) common.push_back(w);
@@ -46,7 +46,7 @@ Mesh<Dim> cut(const Mesh<Dim>& mesh, const std::set<typename MeshTypes<Dim>::Fac
         const std::size_t at = stack.back();
         stack.pop_back();
         for (std::size_t j = 0; j < around.size(); ++j)
-          if (group[j] == kNone && share(around[at], around[j])) {
+          if (group[j] == kNone && fraction(around[at], around[j])) {
             group[j] = groups;
             stack.push_back(j);
           }

@@ -237,14 +237,14 @@ VectorX unproven(const Setup<2>& setup, const std::vector<int>& nodes, std::mt19
   for (std::size_t v = 0; v < places.size(); ++v) rest.segment<2>(2 * static_cast<int>(v)) = places[v];
   std::uniform_real_distribution<double> part(-kSize, kSize);
   do {
-    VectorX way = VectorX::Zero(rest.size());
-    for (const int node : nodes) way.segment<2>(2 * node) = Vec<2>(part(random), part(random));
+    VectorX step = VectorX::Zero(rest.size());
+    for (const int node : nodes) step.segment<2>(2 * node) = Vec<2>(part(random), part(random));
     double valid = 0, inverted = 1;
     while (inverted - valid > 1e-6) {
       const double t = (valid + inverted) / 2;
-      (is_positive(rest + t * way) ? valid : inverted) = t;
+      (is_positive(rest + t * step) ? valid : inverted) = t;
     }
-    x = rest + valid * way;
+    x = rest + valid * step;
   } while (is_proven(x));
   return x;
 }

@@ -47,7 +47,7 @@ struct CurvedScene {
   Strata<Dim> strata;
   std::vector<Probe<Dim>> probes;
 
-  /// A share of the edges is curved, on the surface or not; fields differ from rest positions by so much.
+  /// A fraction of the edges is curved, on the surface or not; fields differ from rest positions by so much.
   explicit CurvedScene(unsigned seed, double curved = 0.4, double noise = 0.1, bool on_surface = true)
       : random(seed), mesh(small_mesh<Dim>(random)) {
     mesh.compact();
@@ -135,7 +135,7 @@ struct CurvedScene {
 
 /// An operation of any kind at a random edge, or at one of its ends, that has to keep `rule`.
 template <int Dim>
-Proposal<Dim> propose_any(CurvedScene<Dim>& scene, const QualityRule& rule = {.share = 0.05, .floor = 0.02}) {
+Proposal<Dim> propose_any(CurvedScene<Dim>& scene, const QualityRule& rule = {.fraction = 0.05, .floor = 0.02}) {
   const EdgeKey edge = scene.any_edge();
   const bool is_curved = scene.mesh.node_of(edge[0], edge[1]) != kNone;
   switch (scene.random() % 7) {

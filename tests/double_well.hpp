@@ -33,10 +33,10 @@ class DoubleWell final : public Energy {
     }
   }
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace&) const override {
-    double share = 1;
+    double fraction = 1;
     for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (std::abs(x[i] + dx[i]) > wall_) share = std::min(share, 0.9 * (wall_ - std::abs(x[i])) / std::abs(dx[i]));
-    return share;
+      if (std::abs(x[i] + dx[i]) > wall_) fraction = std::min(fraction, 0.9 * (wall_ - std::abs(x[i])) / std::abs(dx[i]));
+    return fraction;
   }
 
  private:

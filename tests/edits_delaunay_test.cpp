@@ -70,7 +70,7 @@ TEST(EditsOfDelaunayMeshes, KeepAllInvariantsAndRemoveSlivers) {
     const int at_start = count_slivers();
     for (int i = 0; i < 20000; ++i) {
       const auto operation = static_cast<Operation>(1 + random() % 4);
-      if (const auto proposal = propose_at_random(mesh, strata, operation, random, {.share = 1, .floor = 0.3}))
+      if (const auto proposal = propose_at_random(mesh, strata, operation, random, {.fraction = 1, .floor = 0.3}))
         apply(mesh, strata, *proposal.edit);
     }
     EXPECT_EQ(mesh.find_defect(), "");

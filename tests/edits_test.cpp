@@ -195,7 +195,7 @@ Mesh<3> ring_of(int n, std::mt19937& random, double noise = 0.1) {
   return {rest, cells, std::vector<int>(cells.size(), 1)};
 }
 
-constexpr QualityRule kAnything{.share = 0, .floor = 0};
+constexpr QualityRule kAnything{.fraction = 0, .floor = 0};
 
 TEST(Edits3D, SwapsOfTwoToThreeAndBackAreInverse) {
   Mesh<3> mesh = two_on_a_triangle();
@@ -413,7 +413,7 @@ TEST(Edits3D, LinkConditionOfPatchesSeesSliversOnThem) {
 }
 
 TEST(Edits3D, QualityNeverFallsBelowTheFloorOrWhatItWas) {
-  const QualityRule rule{.share = 0.2, .floor = 0.15};
+  const QualityRule rule{.fraction = 0.2, .floor = 0.15};
   for (unsigned seed = 0; seed < 12; ++seed) {
     std::mt19937 random(seed);
     Mesh<3> mesh = random_tets(3, random, seed % 2);
@@ -440,7 +440,7 @@ TEST(Edits3D, SliversOfTheInputCanBeImproved) {
     ++meshes;
     for (int i = 0; i < 4000; ++i) {
       const auto operation = static_cast<Operation>(1 + random() % 4);
-      if (const auto proposal = propose_at_random(mesh, strata, operation, random, {.share = 1, .floor = 0.3}))
+      if (const auto proposal = propose_at_random(mesh, strata, operation, random, {.fraction = 1, .floor = 0.3}))
         apply(mesh, strata, *proposal.edit);
     }
     ASSERT_EQ(mesh.find_defect(), "");

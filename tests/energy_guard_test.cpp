@@ -30,7 +30,7 @@ Setup<2> square_over_line() {
   setup.obstacles.rest = {{-1, -0.01}, {1, -0.011}};
   setup.obstacles.edges = {{0, 1}};
   setup.obstacles.motion = {kNone, kNone};
-  setup.contact = {.enabled = true, .activation_distance = 2e-3, .convergent = true, .barrier_stiffness = 1e4};
+  setup.contact = {.enabled = true, .dhat = 2e-3, .convergent = true, .barrier_stiffness = 1e4};
   return setup;
 }
 

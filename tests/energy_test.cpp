@@ -294,8 +294,8 @@ TYPED_TEST(VolumeTerms, ModuliThatVaryAreThoseOfEachElement) {
 }
 
 /// Area times outward normal of a facet over the number of its corners.
-Vec<2> area_share(const Vec<2>& a, const Vec<2>& b) { return {(b - a)[1] / 2, -(b - a)[0] / 2}; }
-Vec<3> area_share(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) { return (b - a).cross(c - a) / 6; }
+Vec<2> area_fraction(const Vec<2>& a, const Vec<2>& b) { return {(b - a)[1] / 2, -(b - a)[0] / 2}; }
+Vec<3> area_fraction(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c) { return (b - a).cross(c - a) / 6; }
 
 TYPED_TEST(VolumeTerms, PressurePushesAlongInwardNormalsOfTheDeformedSurface) {
   constexpr int Dim = TypeParam::value;
@@ -313,8 +313,9 @@ TYPED_TEST(VolumeTerms, PressurePushesAlongInwardNormalsOfTheDeformedSurface) {
       if (facet.tag != 5) continue;
       std::array<Vec<Dim>, Dim> p;
       for (int k = 0; k < Dim; ++k) p[k] = vertex_of<Dim>(lagged, facet.vertices[k]);
-      const Vec<Dim> share = std::apply([](const auto&... corner) { return area_share(corner...); }, p);
-      for (const int v : facet.vertices) vertex_of<Dim>(expected, v) += 0.3 * 2.5 * share;  // the gradient: minus the force
+      const Vec<Dim> fraction = std::apply([](const auto&... corner) { return area_fraction(corner...); }, p);
+      for (const int v : facet.vertices)
+        vertex_of<Dim>(expected, v) += 0.3 * 2.5 * fraction;  // the gradient: minus the force
     }
     EXPECT_LE((gradient_of(energy, lagged) - expected).norm(), 1e-13);
     EXPECT_EQ(energy.is_lagged(all_free(lagged.size())), !is_closed);

@@ -205,7 +205,7 @@ TEST(FlatObstacles, AreInclinedPlanesIn3D) {
   setup.obstacles.triangles = {{0, 1, 2}};
   setup.obstacles.motion.assign(3, kNone);
   setup.obstacles.flats = {0};
-  setup.contact = {.enabled = true, .activation_distance = 4e-3, .convergent = true, .barrier_stiffness = 1e6};
+  setup.contact = {.enabled = true, .dhat = 4e-3, .convergent = true, .barrier_stiffness = 1e6};
   setup.body_acceleration = [](const Vec<3>&, double) { return Vec<3>(0, -9.81, 0); };
   setup.time = {.dt = 0.05, .steps = 80};
   Simulation<3> simulation(setup, registry);

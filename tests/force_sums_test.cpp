@@ -25,11 +25,11 @@ class Springs final : public Energy {
   std::string_view name() const override { return "springs"; }
   double value(ConstVectorView x, Workspace&) const override {
     double sum = 0;
-    for_each_spring([&](int v, double k) { sum += 0.5 * k * way(v, x).squaredNorm(); });
+    for_each_spring([&](int v, double k) { sum += 0.5 * k * direction(v, x).squaredNorm(); });
     return sum;
   }
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
-    for_each_spring([&](int v, double k) { gradient.segment<Dim>(Dim * v) += k * way(v, x); });
+    for_each_spring([&](int v, double k) { gradient.segment<Dim>(Dim * v) += k * direction(v, x); });
   }
   void add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const override {
     for_each_spring([&](int v, double k) {
@@ -39,7 +39,7 @@ class Springs final : public Energy {
   }
 
  private:
-  Vec<Dim> way(int v, ConstVectorView x) const { return x.segment<Dim>(Dim * v) - cells_.rest[v]; }
+  Vec<Dim> direction(int v, ConstVectorView x) const { return x.segment<Dim>(Dim * v) - cells_.rest[v]; }
   template <typename F>
   void for_each_spring(const F& f) const {
     for (const auto& element : cells_.elements)
@@ -121,8 +121,8 @@ struct RandomScene {
   bool has_inertia() const { return !setup.time.quasistatic && !setup.time.is_static; }
 
  private:
-  bool with(const char* word, double share = 0.5) {
-    const bool is = std::uniform_real_distribution<double>(0, 1)(random) < share;
+  bool with(const char* word, double fraction = 0.5) {
+    const bool is = std::uniform_real_distribution<double>(0, 1)(random) < fraction;
     if (is) words << ' ' << word << ',';
     return is;
   }

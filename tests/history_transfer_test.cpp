@@ -46,7 +46,7 @@ struct Scene {
     setup.mesh = old_mesh = Mesh<2>(rest, cells, body);
     setup.materials[1] = {.youngs_modulus = 1e5, .density = 2};
     setup.materials[2] = {.youngs_modulus = 1e5, .density = 5};
-    setup.contact = {.enabled = true, .activation_distance = 1e-2};
+    setup.contact = {.enabled = true, .dhat = 1e-2};
     setup.time = {.dt = 0.01};
     setup.obstacles.rest = {{2.5, -5e-3}, {4.5, -5e-3}};
     setup.obstacles.edges = {{0, 1}};
@@ -354,7 +354,7 @@ TEST(HistoryTransfer, ForcedBarrierIn3D) {
     const Mesh<3> old_mesh = make_cube(5, random, 0.15);
     itr::Setup<3> setup;
     setup.materials[1] = {.youngs_modulus = 1e5, .density = kDensity};
-    setup.contact = {.enabled = true, .activation_distance = 1e-2};
+    setup.contact = {.enabled = true, .dhat = 1e-2};
     setup.time = {.dt = 0.01};
     const int n = old_mesh.node_slots();
     VectorX x(3 * (n + 3)), rates = VectorX::Random(x.size());

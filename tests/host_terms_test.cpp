@@ -88,15 +88,15 @@ TEST(HostForces, OfPositionsBalanceAsTheirPotentialDoes) {
   static constexpr double k = 300;  // [N/m]
   VectorX expected;
   std::vector<int> iterations;
-  for (int way = 0; way < 3; ++way) {
+  for (int step = 0; step < 3; ++step) {
     auto setup = block<2>();
-    if (way == 0)
+    if (step == 0)
       setup.terms.push_back([](const CellSet<2>& cells, double, double scale) {
         return std::make_shared<Springs>(k, scale, cells.num_vertices);
       });
     else
       setup.follower.forces = [](const Mesh<2>&, ConstVectorView x, double, VectorView f) { f -= k * x; };
-    if (way == 2)
+    if (step == 2)
       setup.follower.stiffness = [](const Mesh<2>& mesh, ConstVectorView, double, const StiffnessReceiver& add) {
         const Mat<2> block = k * Mat<2>::Identity();
         for (int v = 0; v < mesh.node_slots(); ++v) add(std::array{v}, block.data());
@@ -109,8 +109,8 @@ TEST(HostForces, OfPositionsBalanceAsTheirPotentialDoes) {
       count += result.report.newton_iterations;
     }
     iterations.push_back(count);
-    if (way == 0) expected = simulation.state().history.x[0];
-    EXPECT_LT((simulation.state().history.x[0] - expected).norm(), 1e-9) << "way " << way;
+    if (step == 0) expected = simulation.state().history.x[0];
+    EXPECT_LT((simulation.state().history.x[0] - expected).norm(), 1e-9) << "way " << step;
   }
   EXPECT_LT(iterations[2], iterations[1]);  // the Hessian saves rounds
 }
@@ -184,13 +184,13 @@ TEST(HostForces, InACycleAreNoSolution) {
   setup.newton.step_tolerance = 1e-6;
   setup.follower.forces = [h = setup.time.dt](const Mesh<2>& mesh, ConstVectorView x, double, VectorView f) {
     Vec<2> moment = Vec<2>::Zero();  // mass times barycentre
-    const auto for_each_share = [&](const auto& visit) {
+    const auto for_each_fraction = [&](const auto& visit) {
       for (CellId c = 0; c < mesh.cell_slots(); ++c)
         for (const VertexId v : mesh.cell(c)) visit(v, kDensity * mesh.volume(c) / 3);
     };
-    for_each_share([&](VertexId v, double mass) { moment += mass * (x.segment<2>(2 * v) - mesh.rest(v)); });
+    for_each_fraction([&](VertexId v, double mass) { moment += mass * (x.segment<2>(2 * v) - mesh.rest(v)); });
     const Vec<2> mean = moment / (kDensity * kSize * kSize);
-    for_each_share([&](VertexId v, double mass) { f.segment<2>(2 * v) -= mass / (h * h) * mean; });
+    for_each_fraction([&](VertexId v, double mass) { f.segment<2>(2 * v) -= mass / (h * h) * mean; });
   };
   const StepResult result = step_of(setup);
   EXPECT_FALSE(result.ok);

@@ -38,7 +38,7 @@ CellSet<Dim> one_cell() {
 template <int Dim>
 double mean_jacobian(const QuadraticCell<Dim>& x) {
   double mean = 0;
-  for (const auto& point : quadrature<Dim>(Dim)) mean += point.share * jacobian_at<Dim>(x, point.weights);
+  for (const auto& point : quadrature<Dim>(Dim)) mean += point.fraction * jacobian_at<Dim>(x, point.weights);
   return mean;
 }
 
@@ -122,14 +122,14 @@ TYPED_TEST(JacobianBarriers, StepsLeaveATenthOfTheLeastCoefficient) {
   Workspace workspace;
   int shorter = 0;
   for (int i = 0; i < 2000; ++i) {
-    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.1), way = random_motion<Dim>(random, 0.4);
+    const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.1), step = random_motion<Dim>(random, 0.4);
     const double least = std::min(JacobianBarrier<Dim>::kActive, JacobianBarrier<Dim>(element, x).least_ratio());
     if (least == 0) continue;
-    const double t = elastic.max_step(flat<Dim>(x), flat<Dim>(way), workspace);
+    const double t = elastic.max_step(flat<Dim>(x), flat<Dim>(step), workspace);
     ASSERT_GT(t, 0);
-    EXPECT_GE(JacobianBarrier<Dim>(element, x + t * way).least_ratio(), 0.0999 * least);
-    EXPECT_TRUE(std::isfinite(elastic.value(flat<Dim>(x) + t * flat<Dim>(way), workspace)));
-    shorter += t < 0.89 * max_positive_step<Dim>(x, way);
+    EXPECT_GE(JacobianBarrier<Dim>(element, x + t * step).least_ratio(), 0.0999 * least);
+    EXPECT_TRUE(std::isfinite(elastic.value(flat<Dim>(x) + t * flat<Dim>(step), workspace)));
+    shorter += t < 0.89 * max_positive_step<Dim>(x, step);
   }
   EXPECT_GT(shorter, 2);
 }

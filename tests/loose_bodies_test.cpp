@@ -26,7 +26,7 @@ Setup<2> square_above_a_table(double modulus, const std::string& solver = "eigen
   setup.obstacles.rest = {{-1, -0.02}, {1, -0.02}};
   setup.obstacles.edges = {{0, 1}};
   setup.obstacles.motion = {kNone, kNone};
-  setup.contact = {.enabled = true, .activation_distance = 1e-4, .convergent = true};
+  setup.contact = {.enabled = true, .dhat = 1e-4, .convergent = true};
   setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
   setup.linear.solvers = {solver};
   return setup;
@@ -104,7 +104,7 @@ Setup<3> boxes_above_a_table() {
   setup.obstacles.edges = {{0, 1}, {1, 2}, {0, 2}};
   setup.obstacles.motion = {kNone, kNone, kNone};
   setup.time.is_static = true;
-  setup.contact = {.enabled = true, .activation_distance = 2.7e-4, .convergent = false};
+  setup.contact = {.enabled = true, .dhat = 2.7e-4, .convergent = false};
   setup.contact.friction_coefficient = 0.3;
   return setup;
 }
@@ -113,7 +113,7 @@ TEST(LooseBodies, InAStackLieFlatWithTheFrictionOfContactThatIsThere) {
   for (const double dhat : {1e-4, 2e-4, 2.7e-4, 5e-4, 1e-3}) {
     SCOPED_TRACE(dhat);
     auto setup = boxes_above_a_table();
-    setup.contact.activation_distance = dhat;
+    setup.contact.dhat = dhat;
     linear::Registry registry;
     Simulation<3> simulation(setup, registry);
     const auto result = simulation.advance();

@@ -80,7 +80,7 @@ struct Parts {
   NewtonSummary summary;
   std::optional<Task> task;
   std::optional<Iterate> at;
-  std::optional<HeldMotion> motion;
+  std::optional<DirichletContinuation> motion;
   std::optional<Convergence> convergence;
   std::optional<Direction> direction;
   std::optional<Search> search;
@@ -105,21 +105,21 @@ TEST(Iterate, SaysWhatIsBelowItsResolution) {
   Parts parts(energy, Vec<2>(2, 3));
   Step& step = parts.direction->step();
   const auto is_unresolved = [&](double length) {
-    step.way = -length * parts.at->gradient();
+    step.direction = -length * parts.at->gradient();
     return parts.at->is_unresolved(step);
   };
   EXPECT_FALSE(is_unresolved(1e-3));
   EXPECT_FALSE(is_unresolved(1e-14));
   EXPECT_TRUE(is_unresolved(1e-17));
   Parts at_end(energy, Vec<2>(1 + 1e-9, 1));
-  at_end.direction->step().way = -at_end.at->gradient();
+  at_end.direction->step().direction = -at_end.at->gradient();
   EXPECT_TRUE(at_end.at->is_unresolved(at_end.direction->step())) << "the energy does not resolve 1e-18";
 }
 
-TEST(HeldMotion, TakesTurnsWithTheBodies) {
+TEST(DirichletContinuation, TakesTurnsWithTheBodies) {
   const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(7, 2));
-  HeldMotion& motion = *parts.motion;
+  DirichletContinuation& motion = *parts.motion;
   EXPECT_TRUE(motion.is_advancing());
   EXPECT_EQ(motion.motion().step, VectorX(Vec<2>(0, 1))) << "unknowns have no target";
   EXPECT_TRUE(motion.takes_turns(false));
@@ -137,13 +137,13 @@ TEST(HeldMotion, TakesTurnsWithTheBodies) {
   EXPECT_TRUE(motion.is_advancing()) << "it waits once";
 }
 
-TEST(HeldMotion, GivesUpWhereItIsBlocked) {
+TEST(DirichletContinuation, GivesUpWhereItIsBlocked) {
   const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(1, 2));
-  HeldMotion& motion = *parts.motion;
+  DirichletContinuation& motion = *parts.motion;
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(motion.takes_turns(true));
   EXPECT_FALSE(motion.is_blocked_for_good());
-  motion.note_share(0.5);
+  motion.note_fraction(0.5);
   for (int i = 0; i < 50; ++i) EXPECT_TRUE(motion.takes_turns(true));
   EXPECT_FALSE(motion.is_blocked_for_good()) << "it has advanced in between";
   EXPECT_TRUE(motion.takes_turns(true));
@@ -154,10 +154,11 @@ TEST(HeldMotion, GivesUpWhereItIsBlocked) {
   EXPECT_FALSE(motion.is_stuck());
   parts.begin(50);
   EXPECT_TRUE(motion.is_stuck());
-  EXPECT_NE(motion.describe_way_left().find("100 % of their way is left"), std::string::npos) << motion.describe_way_left();
+  EXPECT_NE(motion.describe_distance_left().find("100 % of their way is left"), std::string::npos)
+      << motion.describe_distance_left();
 }
 
-TEST(HeldMotion, PutsDofsAtTheirTargetsWithinTheTolerance) {
+TEST(DirichletContinuation, PutsDofsAtTheirTargetsWithinTheTolerance) {
   const DoubleWell energy(1);
   NewtonOptions options;
   options.step_tolerance = 1e-3;
@@ -172,7 +173,7 @@ TEST(HeldMotion, PutsDofsAtTheirTargetsWithinTheTolerance) {
 }
 
 /// The merit falls along the way to the target even where the energy rises.
-TEST(HeldMotion, RaisesItsPenalty) {
+TEST(DirichletContinuation, RaisesItsPenalty) {
   const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1, 1), {}, {0, 1}, Vec<2>(1, 2));
   ASSERT_TRUE(parts.direction->find());
@@ -229,8 +230,8 @@ int count_unresolved(double shrinks) {
   for (double distance = 1e-9; !ends && count < 100; distance *= shrinks, ++count) {
     parts.at->move_to(Vec<2>(1 + distance, 1), -0.5);
     parts.begin(count);
-    step.way = -parts.at->gradient() / 2;
-    step.norm = step.way.norm();
+    step.direction = -parts.at->gradient() / 2;
+    step.norm = step.direction.norm();
     ends = parts.convergence->test(step) == Termination::round_off;
   }
   return count;
@@ -249,8 +250,8 @@ TEST(Convergence, CountsStepsBelowRoundOffInARow) {
   Parts parts(energy, Vec<2>(2, 3), options);
   Step& step = parts.direction->step();
   const auto ends = [&](double length) {
-    step.way = -length * parts.at->gradient();
-    step.norm = step.way.norm();
+    step.direction = -length * parts.at->gradient();
+    step.norm = step.direction.norm();
     return parts.convergence->test(step).has_value();
   };
   for (int i = 0; i < 4; ++i) EXPECT_FALSE(ends(1e-18));
@@ -281,7 +282,7 @@ TEST(Convergence, ForeseesTheDecrementByTheGradient) {
   EXPECT_NEAR(before, 1e-4, 1e-5);
   parts.at->move_to(Vec<2>(1.001, 1), 0);
   parts.at->update_gradient();
-  parts.convergence->foresee_decrement();
+  parts.convergence->predict_decrement();
   EXPECT_NEAR(parts.convergence->decrement(), 0.01 * before, 1e-3 * before);
 }
 
@@ -291,7 +292,7 @@ TEST(Direction, IsOfTheTrueHessianWhereThatIsDefinite) {
   ASSERT_TRUE(parts.direction->find());
   EXPECT_EQ(parts.system.projections, std::vector{PsdProjection::none});
   const double expected = -(std::pow(1.1, 3) - 1.1) / (3 * 1.21 - 1);
-  EXPECT_NEAR(parts.direction->step().way[0], expected, 1e-15);
+  EXPECT_NEAR(parts.direction->step().direction[0], expected, 1e-15);
   EXPECT_NEAR(parts.direction->step().norm, std::abs(expected), 1e-15);
   EXPECT_NEAR(parts.direction->step().curvature, 2 * parts.at->decrement_of(parts.direction->step()), 1e-15);
   EXPECT_EQ(parts.direction->indefinite(), 0);
@@ -319,13 +320,13 @@ TEST(Direction, IsShiftedWhereItIsNotProjected) {
   const auto& shifts = parts.system.shifts;
   EXPECT_EQ(shifts.front().value, 0);
   for (std::size_t i = 2; i < shifts.size(); ++i)
-    if (shifts[i].is_share == shifts[i - 1].is_share) {
+    if (shifts[i].is_fraction == shifts[i - 1].is_fraction) {
       EXPECT_NEAR(shifts[i].value / shifts[i - 1].value, 10, 1e-12);
     }
-  EXPECT_TRUE(shifts[1].is_share);
-  EXPECT_FALSE(shifts.back().is_share) << "shares of a negative entry do not make it positive";
+  EXPECT_TRUE(shifts[1].is_fraction);
+  EXPECT_FALSE(shifts.back().is_fraction) << "shares of a negative entry do not make it positive";
   EXPECT_GT(shifts.back().value, 0.97);
-  EXPECT_LT(parts.direction->step().way.dot(parts.at->gradient()), 0);
+  EXPECT_LT(parts.direction->step().direction.dot(parts.at->gradient()), 0);
 }
 
 TEST(Direction, AsksForAsManyDigitsAsItCanUse) {
@@ -378,16 +379,16 @@ TEST(Search, StopsBeforeWhatIsInTheWay) {
   ASSERT_TRUE(parts.direction->find());
   ASSERT_TRUE(parts.search->along(parts.direction->step()));
   EXPECT_EQ(parts.summary.blocked, 2);
-  EXPECT_EQ(parts.summary.blocked_step, parts.direction->step().way);
+  EXPECT_EQ(parts.summary.blocked_step, parts.direction->step().direction);
 }
 
 TEST(Search, StaysWhereNothingLowersTheEnergy) {
   const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(2, 2));
-  parts.direction->step().way = parts.at->gradient();
+  parts.direction->step().direction = parts.at->gradient();
   EXPECT_FALSE(parts.search->along(parts.direction->step()));
   EXPECT_EQ(parts.x, VectorX(Vec<2>(2, 2)));
-  parts.direction->step().way = -0.1 * parts.at->gradient();
+  parts.direction->step().direction = -0.1 * parts.at->gradient();
   EXPECT_TRUE(parts.search->along(parts.direction->step()));
   EXPECT_LT(parts.x[0], 2);
 }
@@ -396,7 +397,7 @@ TEST(Search, GoesOnWhereTheEnergyFallsInAStraightLine) {
   const DoubleWell energy(1);
   Parts parts(energy, Vec<2>(1e-3, 1e-3));
   ASSERT_TRUE(parts.direction->find());
-  const double one_step = 1e-3 + parts.direction->step().way[0];
+  const double one_step = 1e-3 + parts.direction->step().direction[0];
   ASSERT_TRUE(parts.search->along(parts.direction->step()));
   EXPECT_LT(one_step, 0.1);
   EXPECT_GT(parts.x[0], 0.1);

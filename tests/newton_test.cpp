@@ -520,8 +520,7 @@ TEST(Newton, ContactOfOneVertexStopsNoOther) {
   for (int v = 0; v < n; ++v) target[2 * v + 1] = -0.5;
   EnergySum energy;
   energy.add(std::make_shared<Pull>(target));
-  energy.add(
-      std::make_shared<ContactEnergy<2>>(surface, ContactOptions{.enabled = true, .activation_distance = 0.01}, 1e7, 1));
+  energy.add(std::make_shared<ContactEnergy<2>>(surface, ContactOptions{.enabled = true, .dhat = 0.01}, 1e7, 1));
   DenseSystem system;
   Workspace workspace;
   const NewtonSummary summary = minimize(energy, x, DofMap::from_held(held), VectorX(), system, {}, workspace);

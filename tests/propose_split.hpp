@@ -6,7 +6,7 @@
 
 namespace itr {
 
-inline constexpr QualityRule kSplitRule{.share = 0, .floor = 1e-4};
+inline constexpr QualityRule kSplitRule{.fraction = 0, .floor = 1e-4};
 
 /// Splits an edge if it is there and the new cells keep the rule.
 template <int Dim>

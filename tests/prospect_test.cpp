@@ -48,8 +48,8 @@ TEST(Prospect, IsTheIncrementalPotentialWithItsLoadsCompletedToSquares) {
     for (int c = 0; c < scene.mesh.cell_slots(); ++c)
       for (const int v : scene.mesh.cell(c)) {
         const double mass = 2 * scene.mesh.volume(c) / 4;
-        const Vec<3> way = scene.fields.predictor.segment<3>(3 * v) - scene.mesh.rest(v);
-        offset += mass * (fall.dot(way) + fall.squaredNorm() / 2);
+        const Vec<3> step = scene.fields.predictor.segment<3>(3 * v) - scene.mesh.rest(v);
+        offset += mass * (fall.dot(step) + fall.squaredNorm() / 2);
       }
     const double expected = whole_energy(scene.mesh, scene.fields, scene.context) + offset;
     EXPECT_NEAR(available_energy(scene.mesh, scene.fields, scene.context), expected, 1e-12 * expected);

@@ -99,8 +99,9 @@ TEST(QuadraticPatch, PointsBetweenCurveAndChordAreBeyondTheChord) {
   const QuadraticPatch<2> arc = quadratic_patch<2>({Vec<2>(0, 0), Vec<2>(1, 0)}, [](int, int) { return Vec<2>(0.5, 0.1); });
   for (const double x : {0.1, 0.3, 0.5, 0.77}) {
     const double height = 0.4 * x * (1 - x);
-    for (const double share : {0.01, 0.5, 0.999999}) EXPECT_TRUE(is_beyond_chord(arc, Vec<2>(x, share * height))) << x;
-    for (const double share : {-0.01, 1.000001, 2.0}) EXPECT_FALSE(is_beyond_chord(arc, Vec<2>(x, share * height))) << x;
+    for (const double fraction : {0.01, 0.5, 0.999999}) EXPECT_TRUE(is_beyond_chord(arc, Vec<2>(x, fraction * height))) << x;
+    for (const double fraction : {-0.01, 1.000001, 2.0})
+      EXPECT_FALSE(is_beyond_chord(arc, Vec<2>(x, fraction * height))) << x;
   }
 }
 

@@ -61,9 +61,9 @@ TYPED_TEST(Quadratic, QuickBoundsTellWhatFullOnesDo) {
   for (int i = 0; i < 3000; ++i) {
     const QuadraticCell<Dim> x = unit_cell<Dim>() + random_motion<Dim>(random, 0.02 * (i % 16));
     const double bound = min_jacobian_bound<Dim>(x, 0.1);
-    for (const double share : {0.2, 0.9, 1.1, 3.0, -1.0}) {
-      const double enough = share * std::abs(bound);
-      EXPECT_EQ(min_jacobian_bound<Dim>(x, 0.1, enough) < enough, bound < enough) << i << ", " << share;
+    for (const double fraction : {0.2, 0.9, 1.1, 3.0, -1.0}) {
+      const double enough = fraction * std::abs(bound);
+      EXPECT_EQ(min_jacobian_bound<Dim>(x, 0.1, enough) < enough, bound < enough) << i << ", " << fraction;
       less += bound < enough;
     }
     constexpr double kMost = 0.2;
@@ -181,7 +181,7 @@ double deformed_volume(const CellSet<Dim>& cells, const VectorX& x) {
   for (const auto& element : cells.curved())
     for (const auto& point : quadrature<Dim>(Dim)) {
       const Mat<Dim> F = at_nodes<Dim>(element.nodes(), x) * shape_gradients<Dim>(element, point.weights).transpose();
-      sum += element.volume * point.share * F.determinant();
+      sum += element.volume * point.fraction * F.determinant();
     }
   return sum;
 }
@@ -392,7 +392,7 @@ Setup<2> collision() {
   setup.time.dt = 0.01;
   setup.time.steps = 20;
   setup.contact.enabled = true;
-  setup.contact.activation_distance = 0.02;
+  setup.contact.dhat = 0.02;
   setup.contact.barrier_stiffness = 1e3;
   setup.contact.adaptive_stiffness = false;
   setup.contact.friction_coefficient = 0.3;

@@ -120,7 +120,7 @@ struct TrialScene {
     context.materials[1] = {.youngs_modulus = 10, .poisson_ratio = 0.3, .density = 2};
     context.materials[2] = {.youngs_modulus = 1000, .poisson_ratio = 0.4, .density = 5};
     context.scaling = 0.01;
-    context.contact = {.enabled = true, .activation_distance = 0.03, .convergent = true, .barrier_stiffness = 5};
+    context.contact = {.enabled = true, .dhat = 0.03, .convergent = true, .barrier_stiffness = 5};
     context.newton.step_tolerance = 1e-9;
     context.shortest_edge = 0.1;
     context.loads.acceleration = [](const Vec<2>&) { return Vec<2>(0, -1); };

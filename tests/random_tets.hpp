@@ -121,7 +121,7 @@ inline Mesh<3> random_tets(int n, std::mt19937& random, bool slivers) {
     for (const int w : mesh.cell(c))
       if (w != v) opposite += mesh.rest(w) / 3;
     const Vec<3> target = mesh.rest(v) + (1 - 1e-3 * (1 + unit())) * (opposite - mesh.rest(v));
-    if (const auto move = propose_move<3>(mesh, strata, v, target, {.share = 0, .floor = 0}))
+    if (const auto move = propose_move<3>(mesh, strata, v, target, {.fraction = 0, .floor = 0}))
       apply(mesh, strata, *move.edit);
   }
   mesh.compact();

@@ -69,9 +69,9 @@ std::string options_of(const Scene& scene) {
   std::string text =
       fmt::format("{} {} {} {} {} {} {} {} {} {} {}|", static_cast<int>(t.integrator), t.bdf_order, t.newmark_beta,
                   t.newmark_gamma, t.energy_growth_limit, t.quasistatic, t.is_static, t.step_cuts, t.t0, t.dt, t.steps);
-  text += fmt::format("{} {} {} {} {} {} {} {} {}|", c.enabled, c.activation_distance, c.convergent, c.barrier_stiffness,
-                      c.adaptive_stiffness, c.friction_coefficient, c.friction_velocity, c.friction_iterations,
-                      c.friction_tolerance);
+  text +=
+      fmt::format("{} {} {} {} {} {} {} {} {}|", c.enabled, c.dhat, c.convergent, c.barrier_stiffness, c.adaptive_stiffness,
+                  c.friction_coefficient, c.friction_velocity, c.friction_iterations, c.friction_tolerance);
   text += fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {}|", n.max_iterations, static_cast<int>(n.norm),
                       n.step_tolerance, n.gradient_tolerance, n.first_gradient_tolerance, n.relative_step_tolerance,
                       n.relative_gradient_tolerance, n.decrement_tolerance, n.energy_tolerance, n.energy_steps,

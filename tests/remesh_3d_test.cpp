@@ -252,7 +252,7 @@ TEST(Gate3d, LetsCollapsesOnFlatSurfacesPass) {
   for (int v = 0; v < mesh.node_slots(); ++v) fields.x.segment<3>(3 * v) = mesh.rest(v);
   fields.past_positions = {fields.x};
   StepContext<3> context;
-  context.contact = {.enabled = true, .activation_distance = 0.01};
+  context.contact = {.enabled = true, .dhat = 0.01};
   context.obstacles.past_x.resize(1);
   const Gate<3> gate(mesh, fields, context);
   GateScratch<3> scratch;
@@ -288,7 +288,7 @@ TEST(Gate3d, LetsNoSwapTakeAnObstacleIn) {
     return false;
   };
   StepContext<3> context;
-  context.contact = {.enabled = true, .activation_distance = 0.01};
+  context.contact = {.enabled = true, .dhat = 0.01};
   GateScratch<3> scratch;
   int asked = 0, inward = 0;
   for (const EdgeKey& edge : mesh.edges()) {

@@ -143,7 +143,7 @@ class WarmTrial : public ::testing::Test {
   void press_onto_plane() {
     constexpr double kDhat = 0.05;
     auto& context = body_.context;
-    context.contact = {.enabled = true, .activation_distance = kDhat, .convergent = true, .barrier_stiffness = 1e4};
+    context.contact = {.enabled = true, .dhat = kDhat, .convergent = true, .barrier_stiffness = 1e4};
     context.contact.friction_coefficient = 0.3;
     context.contact.friction_velocity = 1e-3;
     body_.fields.velocity_reference = body_.fields.predictor;
@@ -164,7 +164,7 @@ TYPED_TEST_SUITE(WarmTrial, Dimensions);
 
 TYPED_TEST(WarmTrial, OfASplitAllocatesNothing) {
   this->expect_no_allocation(this->splits(), HistoryRule::function);
-  this->body_.context.contact = {.enabled = true, .activation_distance = 0.01, .convergent = true};  // nothing is that near
+  this->body_.context.contact = {.enabled = true, .dhat = 0.01, .convergent = true};  // nothing is that near
   this->expect_no_allocation(this->splits(), HistoryRule::function);
 }
 

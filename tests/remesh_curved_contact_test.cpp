@@ -37,7 +37,7 @@ auto straight_scene(unsigned seed, std::integral_constant<int, 2>) {
 }
 auto straight_scene(unsigned seed, std::integral_constant<int, 3>) { return TetScene(seed, 2); }
 
-/// A random scene in contact, a share of its edges curved; not all are valid.
+/// A random scene in contact, a fraction of its edges curved; not all are valid.
 template <int Dim>
 struct Scene {
   decltype(straight_scene(0, std::integral_constant<int, Dim>())) base;
@@ -47,13 +47,13 @@ struct Scene {
   std::mt19937& random = base.random;
   Strata<Dim> strata;
 
-  explicit Scene(unsigned seed, double share, double noise)
+  explicit Scene(unsigned seed, double fraction, double noise)
       : base(straight_scene(seed, std::integral_constant<int, Dim>())) {
     mesh.compact();
     strata = Strata<Dim>(mesh);
     std::uniform_real_distribution<double> off(-noise, noise);
     for (const EdgeKey& edge : mesh.edges()) {
-      if (std::uniform_real_distribution<double>(0, 1)(random) >= share) continue;
+      if (std::uniform_real_distribution<double>(0, 1)(random) >= fraction) continue;
       const VertexId node = mesh.add_node(edge);
       strata.add_nodes(1);
       fields.for_each([&](VectorX& field) {
@@ -177,10 +177,10 @@ TYPED_TEST(CurvedContact, NothingTouchesInTheRoomThatAReachGivesWayTo) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     Scene<Dim> scene(seed, 0.4, 0.002);
     if (!is_valid(scene)) continue;
-    scene.context.contact.activation_distance *= 0.02 * (1 + seed % 40);
+    scene.context.contact.dhat *= 0.02 * (1 + seed % 40);
     View<Dim> view(scene, scene.context, HistoryRule::interpolated);
     const SurfaceIndex<Dim>& surface = view.state.surface;
-    const double dhat = scene.context.contact.activation_distance;
+    const double dhat = scene.context.contact.dhat;
     for (VertexId v = 0; v < scene.mesh.node_slots(); ++v) {
       if (!scene.mesh.is_vertex_alive(v) || !scene.mesh.is_boundary(v)) continue;
       ContactReach<Dim> usual, yielding;
@@ -360,7 +360,7 @@ struct Bulge {
     fields.x[9] += height;
     fields.past_positions = {fields.x};
     context.contact.enabled = true;
-    context.contact.activation_distance = 1e-3;
+    context.contact.dhat = 1e-3;
     context.materials[1] = {};
     auto& obstacles = context.obstacles;
     obstacles.rest = obstacles.x = {point};
@@ -412,7 +412,7 @@ Setup<Dim> pressed_bar() {
   setup.time.dt = 0.05;
   setup.time.steps = Dim == 2 ? 8 : 6;
   setup.contact.enabled = true;
-  setup.contact.activation_distance = 0.01;
+  setup.contact.dhat = 0.01;
   setup.contact.convergent = true;
   setup.contact.barrier_stiffness = 1e5;
   setup.contact.adaptive_stiffness = false;
@@ -460,7 +460,7 @@ double depth_in_tent(const State<2>& state) {
 
 TEST(CurvedSurface, OfARunOverlapsNothing) {
   itr::Setup<2> setup = pressed_bar<2>();
-  setup.contact.activation_distance = 1e-3;
+  setup.contact.dhat = 1e-3;
   setup.contact.barrier_stiffness = 1e6;
   setup.choose_defaults();
   linear::Registry registry;

@@ -37,7 +37,7 @@ struct LongScene : CurvedScene<Dim> {
     context.shortest_edge = 0.1;
     context.longest_edge = 0.5;
     context.contact.enabled = contact;
-    context.contact.activation_distance = 5e-3;
+    context.contact.dhat = 5e-3;
     context.contact.barrier_stiffness = 100;
     context.obstacles.past_x.resize(1);
     fields.velocity_reference = VectorX();

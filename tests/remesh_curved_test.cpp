@@ -275,7 +275,7 @@ double squared_distance(const Mesh<Dim>& mesh_a, const VectorX& a, const Mesh<Di
               in_a[m] += point.weights[k] * piece.in_a[k][m];
               in_b[m] += point.weights[k] * piece.in_b[k][m];
             }
-          sum += 0.5 * materials.at(mesh_a.body(i)).density * point.share * piece.volume *
+          sum += 0.5 * materials.at(mesh_a.body(i)).density * point.fraction * piece.volume *
                  (value_at<Dim>(mesh_a, a, i, in_a) - value_at<Dim>(mesh_b, b, j, in_b)).squaredNorm();
         }
     }
@@ -363,7 +363,7 @@ Eigen::Matrix<double, Dim + 1, Dim> moments(const Mesh<Dim>& mesh, const VectorX
     for (const auto& point : quadrature<Dim>(kMassDegree)) {
       Vec<Dim + 1> one_and_place = Vec<Dim + 1>::Unit(0);
       for (int k = 0; k <= Dim; ++k) one_and_place.template tail<Dim>() += point.weights[k] * mesh.rest(mesh.cell(c)[k]);
-      sum += materials.at(mesh.body(c)).density * mesh.volume(c) * point.share * one_and_place *
+      sum += materials.at(mesh.body(c)).density * mesh.volume(c) * point.fraction * one_and_place *
              value_at<Dim>(mesh, field, c, point.weights).transpose();
     }
   }

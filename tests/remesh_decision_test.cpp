@@ -147,7 +147,7 @@ struct BulgeScene {
     const std::vector<Vec<2>> rest{{0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, -1}, {1, -1}, {2, -1}, {3, -1}};
     mesh = Mesh<2>(rest, {{4, 5, 0}, {5, 1, 0}, {5, 6, 1}, {6, 2, 1}, {6, 7, 2}, {7, 3, 2}}, std::vector<int>(6, 1));
     context.materials[1] = {.youngs_modulus = 10, .poisson_ratio = 0.3, .density = 1};
-    context.contact = {.enabled = true, .activation_distance = 1e-3};
+    context.contact = {.enabled = true, .dhat = 1e-3};
     fields.x.resize(16);
     for (int v = 0; v < 8; ++v) fields.x.segment<2>(2 * v) = rest[v];
     fields.x[3] = -0.3;  // the second vertex of the top is pressed in by the point

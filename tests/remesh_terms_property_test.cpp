@@ -106,10 +106,10 @@ double weighted(const VectorX& masses, const VectorX& a, const VectorX& b) {
 double lumped_inertia(const Mesh<2>& old_mesh, const VectorX& old_predictor, const Mesh<2>& mesh, const VectorX& predictor,
                       const VectorX& start, const VectorX& x, const std::map<int, Material>& materials) {
   const VectorX old_masses = lumped_masses(old_mesh, materials), masses = lumped_masses(mesh, materials);
-  const VectorX gap = evaluate(mesh, predictor, old_mesh) - old_predictor, way = x - predictor, first = start - predictor;
-  const VectorX way_there = evaluate(mesh, way, old_mesh), first_there = evaluate(mesh, first, old_mesh);
-  return 0.5 * (weighted(masses, way, way) - weighted(masses, first, first) +
-                weighted(old_masses, first_there, first_there) + weighted(old_masses, gap, gap + 2 * way_there));
+  const VectorX gap = evaluate(mesh, predictor, old_mesh) - old_predictor, step = x - predictor, first = start - predictor;
+  const VectorX step_there = evaluate(mesh, step, old_mesh), first_there = evaluate(mesh, first, old_mesh);
+  return 0.5 * (weighted(masses, step, step) - weighted(masses, first, first) +
+                weighted(old_masses, first_there, first_there) + weighted(old_masses, gap, gap + 2 * step_there));
 }
 
 bool is_near(const Mesh<2>& mesh, const VectorX& a, const VectorX& b) {

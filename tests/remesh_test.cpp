@@ -277,7 +277,8 @@ TEST(Prediction, OfASplitAloneIsThatOfItsEdit) {
   }
 }
 
-/// A share of it, from the vertex that disappears alone; what a patch cannot get back is not far from that (prediction.cpp).
+/// A fraction of it, from the vertex that disappears alone; what a patch cannot get back is not far from that
+/// (prediction.cpp).
 TEST(Prediction, CountsAShareOfTheHistoryThatACollapseForgets) {
   int compared = 0, too_large = 0, too_small = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {

@@ -20,7 +20,7 @@ const Elastic& block() {
   return result;
 }
 
-/// As stiff as the block in each place but for a share of up to `change` of its own.
+/// As stiff as the block in each place but for a fraction of up to `change` of its own.
 std::vector<double> changed(const Elastic& system, double change) {
   std::vector<double> values = system.values;
   for (int j = 0; j < system.pattern.order; ++j) values[system.pattern.column_starts[j]] *= 1 + change * (j % 7) / 6;

@@ -55,7 +55,7 @@ Setup<Dim> sliding_body(double unit) {
   }
   setup.obstacles.motion.assign(setup.obstacles.rest.size(), kNone);
   setup.contact = {.enabled = true,
-                   .activation_distance = 2e-5 * unit,
+                   .dhat = 2e-5 * unit,
                    .convergent = true,
                    .barrier_stiffness = 1e4 * stress,
                    .friction_coefficient = 0.3,

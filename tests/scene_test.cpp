@@ -36,7 +36,7 @@ TEST_F(SceneTest, CommonPatchAndNull) {
   const itr::Setup<2> setup = read2(scene);  // the mesh lies beside the outer file
 
   EXPECT_EQ(setup.time.steps, 5);
-  EXPECT_EQ(setup.contact.activation_distance, 0.5);
+  EXPECT_EQ(setup.contact.dhat, 0.5);
   EXPECT_EQ(setup.contact.friction_velocity, 1e-3);
   EXPECT_EQ(setup.mesh.num_vertices(), 9);
   EXPECT_EQ(setup.materials.at(1).youngs_modulus, 7);
@@ -280,16 +280,16 @@ TEST_F(SceneTest, WaysToProjectTheHessian) {
 
 /// The known norms of peers' scenes are those of an L D L^T, which takes indefinite directions.
 TEST_F(SceneTest, WayThroughIndefiniteHessiansIsThatOfAnLdltThatTheSceneNamesFirst) {
-  const auto way = [&](const json& solvers) {
+  const auto direction = [&](const json& solvers) {
     return read2(square({{"solver", {{"linear", {{"solver", solvers}}}}}})).newton.indefinite;
   };
   for (const char* name : {"Eigen::SimplicialLDLT", "Eigen::PardisoLDLT", "Eigen::AccelerateLDLT"}) {
-    EXPECT_EQ(way(name), IndefiniteHessian::accept);
-    EXPECT_EQ(way({name, "Eigen::CholmodSupernodalLLT"}), IndefiniteHessian::accept);
-    EXPECT_EQ(way({"Eigen::CholmodSupernodalLLT", name}), IndefiniteHessian::project);
+    EXPECT_EQ(direction(name), IndefiniteHessian::accept);
+    EXPECT_EQ(direction({name, "Eigen::CholmodSupernodalLLT"}), IndefiniteHessian::accept);
+    EXPECT_EQ(direction({"Eigen::CholmodSupernodalLLT", name}), IndefiniteHessian::project);
   }
   for (const char* name : {"eigen:ldlt", "mumps", "cholmod", "Eigen::PardisoLLT"})
-    EXPECT_EQ(way({name, "eigen"}), IndefiniteHessian::project) << name;
+    EXPECT_EQ(direction({name, "eigen"}), IndefiniteHessian::project) << name;
 }
 
 TEST_F(SceneTest, TolerancesCarryTheTimeStep) {
@@ -384,15 +384,15 @@ TEST_F(SceneTest, ActivationDistanceShrinksUnlessGiven) {
   json absent = small;
   absent["contact"] = {{"enabled", true}};
 
-  EXPECT_NEAR(read2(square(absent)).contact.activation_distance, 0.8e-4, 1e-12);
-  EXPECT_EQ(read2(square(given)).contact.activation_distance, 1e-3);
+  EXPECT_NEAR(read2(square(absent)).contact.dhat, 0.8e-4, 1e-12);
+  EXPECT_EQ(read2(square(given)).contact.dhat, 1e-3);
   EXPECT_EQ(read_scene(square(given)).warnings.size(), 1u);
   EXPECT_TRUE(read2(square(given)).contact.adaptive_stiffness);
   given["solver"] = {{"contact", {{"barrier_stiffness", "auto"}}}};
   EXPECT_FALSE(read2(square(given)).contact.adaptive_stiffness);
   EXPECT_EQ(read2(square(given)).contact.barrier_stiffness, 0);
   given["contact"]["dhat"] = "auto";
-  EXPECT_EQ(read2(square(given)).contact.activation_distance, 0);
+  EXPECT_EQ(read2(square(given)).contact.dhat, 0);
 }
 
 /// In kilometres a body of 0.1 mm has an extent of 1e-7.

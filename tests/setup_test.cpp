@@ -50,7 +50,7 @@ const std::vector<Mistake> kMistakes = {
     {"dt of 0", [](auto& s) { s.time.dt = 0; }, "/time/dt", "0", "> 0"},
     {"no steps", [](auto& s) { s.time.steps = 0; }, "/time/time_steps", "0", ">= 1"},
     {"BDF7", [](auto& s) { s.time.bdf_order = 7; }, "/time/integrator/steps", "7", "1 to 6"},
-    {"d-hat of -1", [](auto& s) { s.contact.activation_distance = -1; }, "/contact/dhat", "-1", ">= 0"},
+    {"d-hat of -1", [](auto& s) { s.contact.dhat = -1; }, "/contact/dhat", "-1", ">= 0"},
     {"negative friction", [](auto& s) { s.contact.friction_coefficient = -1; }, "/contact/friction_coefficient", "-1",
      ">= 0"},
     {"motion out of range", [](auto& s) { s.obstacles.motion[1] = 3; }, "obstacles.motion[1]", "3", "kNone"},

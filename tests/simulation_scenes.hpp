@@ -43,11 +43,7 @@ inline Setup<2> impact() {
   setup.obstacles.rest = {{-1, -0.01}, {1, -0.011}};
   setup.obstacles.edges = {{0, 1}};
   setup.obstacles.motion = {kNone, kNone};
-  setup.contact = {.enabled = true,
-                   .activation_distance = 2e-3,
-                   .convergent = true,
-                   .barrier_stiffness = 1e4,
-                   .friction_coefficient = 0.2};
+  setup.contact = {.enabled = true, .dhat = 2e-3, .convergent = true, .barrier_stiffness = 1e4, .friction_coefficient = 0.2};
   setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(0.3, -2); }});
   setup.newton.step_tolerance = 1e-7;
   setup.newton.gradient_tolerance = 1e-10;

@@ -207,7 +207,7 @@ TEST(Simulation, OnAMeshThatStaysHasTheBitsOfAFreshOne) {
     EXPECT_EQ(one.report.min_distance, two.report.min_distance);
     nearest = std::min(nearest, one.report.min_distance);
   }
-  EXPECT_LT(nearest, setup.contact.activation_distance) << "nothing touched";
+  EXPECT_LT(nearest, setup.contact.dhat) << "nothing touched";
 }
 
 TEST(Simulation, HasTheSameBitsForOneAndTwoThreads) {

@@ -133,7 +133,7 @@ void refine_at_contact() {
   SizedBody<Dim> body(tilt);
   put_spike_below(body);
   body.context.contact.enabled = true;
-  body.context.contact.activation_distance = 0.03;
+  body.context.contact.dhat = 0.03;
   // The inner vertices' lengths alone ask for nothing; what is in contact spans some of the way to the spike.
   for (int v = 0; v < body.mesh.node_slots(); ++v) {
     auto x = body.fields.x.template segment<Dim>(Dim * v);

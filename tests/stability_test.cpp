@@ -30,9 +30,9 @@ Setup<2> column() {
     setup.mesh.set_facet_tag(f, x == 0 ? 1 : x == kLength ? 2 : 3);
   }
   setup.materials[1] = {.youngs_modulus = kModulus, .poisson_ratio = 0.3, .density = 1000};
-  const double way = 1.6 * std::pow(std::numbers::pi * kThickness / kLength, 2) / 3 * kLength;
+  const double direction = 1.6 * std::pow(std::numbers::pi * kThickness / kLength, 2) / 3 * kLength;
   setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }},
-                     {2, {true, true}, [way](const Vec<2>&, double t) { return Vec<2>(-way * t, 0); }}};
+                     {2, {true, true}, [direction](const Vec<2>&, double t) { return Vec<2>(-direction * t, 0); }}};
   setup.time = {.dt = 0.25, .steps = 4};
   setup.time.quasistatic = true;
   setup.newton.step_tolerance = 1e-9;
@@ -157,7 +157,7 @@ TEST(Stability, ACubePressedBetweenPlatesIsLeftAlone) {
     setup.obstacles.motion.insert(setup.obstacles.motion.end(), 4, z < 0 ? kNone : 0);
   }
   setup.obstacles.motions = {[](const Vec<3>&, double t) { return Vec<3>(0, 0, -0.5 * t); }};
-  setup.contact = {.enabled = true, .activation_distance = 1.8e-4, .convergent = true, .barrier_stiffness = 0};
+  setup.contact = {.enabled = true, .dhat = 1.8e-4, .convergent = true, .barrier_stiffness = 0};
   setup.time = {.dt = 0.1, .steps = 10};
   setup.time.quasistatic = true;
   setup.newton.step_tolerance = 1e-9;

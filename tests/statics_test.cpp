@@ -74,7 +74,7 @@ TEST(Statics, ContactCarriesTheLoad) {
   setup.obstacles.rest = {{-1, -0.001}, {1, -0.001}};
   setup.obstacles.edges = {{0, 1}};
   setup.obstacles.motion = {kNone, kNone};
-  setup.contact = {.enabled = true, .activation_distance = 2e-3, .convergent = true, .barrier_stiffness = 1e5};
+  setup.contact = {.enabled = true, .dhat = 2e-3, .convergent = true, .barrier_stiffness = 1e5};
   setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -10); };
   setup.newton.gradient_tolerance = 1e-8;
   linear::Registry registry;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The problem of one step: what problems share of a cache belongs to whichever solves.
+// The problem of one step: what problems fraction of a cache belongs to whichever solves.
 #include "simulation/step_problem.hpp"
 
 #include <gtest/gtest.h>

@@ -48,7 +48,7 @@ TermFactory<2> push(const Vec<2>& force) {
 /// A scene in which every kind of term acts.
 TrialScene scene_of_all_terms() {
   TrialScene scene(1, 6, {.friction = true, .pressure = true, .damping = true});
-  scene.context.contact.activation_distance = 0.1;  // to the obstacle and beyond
+  scene.context.contact.dhat = 0.1;  // to the obstacle and beyond
   scene.context.host.push_back(push({1, 0}));
   scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
   return scene;

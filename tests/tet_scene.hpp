@@ -19,7 +19,7 @@ struct TetScene {
   explicit TetScene(unsigned seed, int n = 3) : random(seed), mesh(random_tets(n, random, false)) {
     for (const int body : {1, 2, 3}) context.materials[body] = {.youngs_modulus = 1000, .poisson_ratio = 0.3, .density = 2};
     context.scaling = 0.01;
-    context.contact = {.enabled = true, .activation_distance = 0.02, .convergent = true, .barrier_stiffness = 50};
+    context.contact = {.enabled = true, .dhat = 0.02, .convergent = true, .barrier_stiffness = 50};
     context.contact.friction_coefficient = 0.2;
     context.newton.step_tolerance = 1e-9;
     context.shortest_edge = 0.1;

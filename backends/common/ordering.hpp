@@ -26,7 +26,7 @@ std::optional<int> find_ordering(const Ordering (&table)[N], std::string_view ke
 /// The fill-reducing order of an analysis, for later ones of patterns that are much alike: contacts come and go.
 class KeptOrder {
  public:
-  /// `permutation` as the library gives and takes it; `flops` of a factorisation, as its analysis foresees them.
+  /// `permutation` as the library gives and takes it; `flops` of a factorisation, as its analysis predicts them.
   void keep(const int* permutation, int order, double flops) {
     permutation_.assign(permutation, permutation + order);
     flops_ = flops;

@@ -144,7 +144,7 @@ class Mumps {
   itr_statistics statistics() const {
     itr_statistics result{};
     if (session_ < 0) return result;
-    // Before the first factorisation what the analysis foresees.
+    // Before the first factorisation what the analysis predicts.
     result.factor_nonzeros = count(infog(mumps_, is_factorized_ ? 29 : 20));
     result.largest_bytes = 1e6 * infog(mumps_, is_factorized_ ? 21 : 16);
     result.factor_bytes = 1e6 * infog(mumps_, is_factorized_ ? 22 : 17);

@@ -48,7 +48,7 @@ int main() {
   std::vector<char> counts(kVertices, 0);  // pairs of two roof vertices do not count
   std::fill_n(counts.begin(), kRope, 1);
   const auto surface = itr::collision_surface<2>(edges, {}, {}, rest, counts);
-  const itr::ContactOptions options{.enabled = true, .activation_distance = 0.01};
+  const itr::ContactOptions options{.enabled = true, .dhat = 0.01};
   const itr::ContactEnergy<2> contact(*surface, options, 1e6, kStep * kStep);
   itr::Workspace workspace;
 

@@ -43,18 +43,18 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   double value(ConstVectorView x, Workspace& workspace) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
-  /// Largest share of dx without impact, by conservative CCD. Positions are feasible if no pair touches. Where dx brings
+  /// Largest fraction of dx without impact, by conservative CCD. Positions are feasible if no pair touches. Where dx brings
   /// too many pairs into question at a time, it is walked in parts, and less of it told if these are many.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Shares of dx by vertex, from planar bounds of each pair (`planar_shares`); of its first part where it is walked in
   /// parts.
-  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
-  /// The pairs that block a step along dx before `share` of it; in its first part where it is walked in parts.
-  bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+  bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  /// The pairs that block a step along dx before `fraction` of it; in its first part where it is walked in parts.
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
   /// Finds candidate pairs for a solve that begins at x and is expected to move by dx. One search then serves its start and
   /// its first step. The search is always made, so that its result does not depend on earlier solves.
-  void foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
+  void predict_motion(ConstVectorView x, const VectorX& dx, Workspace& workspace) const;
   /// The pair with the earliest time of impact.
   StepLimit step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
 

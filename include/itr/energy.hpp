@@ -176,10 +176,10 @@ class ITR_EXPORT Energy {
   virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
   /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
   /// as a whole. False where the term cannot tell; `ways` is as long as dx, and undefined then.
-  virtual bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const;
-  /// Adds the pairs that stop dx before `share` of it, and bounds the gaps of all pairs in `blocking` at its end. False
+  virtual bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const;
+  /// Adds the pairs that stop dx before `fraction` of it, and bounds the gaps of all pairs in `blocking` at its end. False
   /// where the term cannot tell.
-  virtual bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+  virtual bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                              Workspace& workspace) const;
 };
 

@@ -127,7 +127,7 @@ struct ITR_EXPORT StepSetup {
   FieldOptions fields;
   bool lump_mass = false;
   /// Pressure and follower forces that have no potential are taken at the solution of the solve before. A step fails where
-  /// they end farther off those of its own solution than this share of themselves.
+  /// they end farther off those of its own solution than this fraction of themselves.
   double lagged_load_tolerance = 1e-2;
   /// Rounds for what is lagged (friction, pressure, damping) go on until no force at a vertex changes by more than this part
   /// of the largest. Where they do not get there the step is cut, or where it may not, a warning says so. 0: rounds as

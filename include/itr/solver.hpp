@@ -58,7 +58,7 @@ struct AnalyzeHints {
   bool may_keep_order = false;
 };
 
-/// Costs of the last factorisation and solve, or those that the analysis foresees. Zero if the library does not report them.
+/// Costs of the last factorisation and solve, or those that the analysis predicts. Zero if the library does not report them.
 struct Statistics {
   double factor_nonzeros = 0;
   double factor_bytes = 0;   ///< summed over MPI ranks

@@ -76,8 +76,8 @@ void CellModel<Dim>::add_halves(const PlacedCell<Dim>& cell, int body, const Mat
   if (terms_.has_inertia) {
     const ElementMass<Dim> matrix(terms_.mass, mass);
     Vec<Dim> total = Vec<Dim>::Zero();
-    for (int k = 0; k <= Dim; ++k) total += cell.way.col(k);
-    middle.gradient += matrix.product(total, Vec<Dim>((cell.way.col(a) + cell.way.col(b)) / 2));
+    for (int k = 0; k <= Dim; ++k) total += cell.step.col(k);
+    middle.gradient += matrix.product(total, Vec<Dim>((cell.step.col(a) + cell.step.col(b)) / 2));
     middle.hessian.diagonal().array() += matrix.diagonal();
   }
   if (!terms_.loads.acceleration) return;
@@ -191,14 +191,14 @@ void CellModel<Dim>::add_inertia(const PlacedCell<Dim>& cell, double mass, const
   Vec<Dim> total = Vec<Dim>::Zero();
   double squares = 0;
   for (int k = 0; k <= Dim; ++k) {
-    total += cell.way.col(k);
-    squares += cell.way.col(k).squaredNorm();
+    total += cell.step.col(k);
+    squares += cell.step.col(k).squaredNorm();
   }
   const ElementMass<Dim> matrix(terms_.mass, mass);
   energy_ += matrix.energy(total, squares);
   for (int k = 0; k <= Dim; ++k) {
     if (places[k] == kNone) continue;
-    moving_[places[k]].gradient += matrix.product(total, Vec<Dim>(cell.way.col(k)));
+    moving_[places[k]].gradient += matrix.product(total, Vec<Dim>(cell.step.col(k)));
     moving_[places[k]].hessian.diagonal().array() += matrix.diagonal();
     for (int l = 0; together_ && l <= Dim; ++l)
       if (places[l] != kNone && places[l] != places[k]) between(places[k], places[l]).diagonal().array() += matrix.off;
@@ -230,7 +230,7 @@ void CellModel<Dim>::add_curved(const Geometry& geometry, const Places& places) 
   for (int k = Dim + 1; k < kNodes; ++k)
     if (!has_node<Dim>(cell.curved, k)) {
       all.x.col(k).setZero();
-      all.way.col(k).setZero();
+      all.step.col(k).setZero();
     }
   add_elasticity({all, geometry.material, geometry.inverse, geometry.volume}, places);
   if (terms_.has_inertia || terms_.loads.acceleration)
@@ -245,7 +245,7 @@ void CellModel<Dim>::add_elasticity(const Geometry& geometry, const Places& plac
   std::optional<ElasticPoint<Dim>> response;
   for (const auto& point : cell_quadrature<Dim>(cell.level, terms_.quadrature_degree)) {
     const auto shapes = quadratic_gradients<Dim, Dim>(cell.curved, point.weights, linear);
-    const double weight = terms_.scaling * geometry.volume * point.share;
+    const double weight = terms_.scaling * geometry.volume * point.fraction;
     if (!response || !is_uniform)
       response.emplace(Mat<Dim>(cell.x * shapes.transpose()),
                        elastic_moduli<Dim>(geometry.material, geometry.place(point.weights)));
@@ -274,10 +274,10 @@ void CellModel<Dim>::add_mass_and_weight(const Geometry& geometry, const Places&
   for (const auto& point : quadrature<Dim>(kMassDegree)) {
     const auto shapes = quadratic_shapes<Dim>(cell.curved, point.weights);
     const Vec<Dim> X = geometry.place(point.weights);
-    const double weight = point.share * mass_density<Dim>(geometry.material, X) * geometry.volume;
+    const double weight = point.fraction * mass_density<Dim>(geometry.material, X) * geometry.volume;
     Vec<Dim> force = Vec<Dim>::Zero();
     if (terms_.has_inertia) {
-      const Vec<Dim> here = cell.way * shapes;
+      const Vec<Dim> here = cell.step * shapes;
       force = weight * here;
       energy_ += 0.5 * force.dot(here);
     }

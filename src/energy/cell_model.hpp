@@ -17,9 +17,9 @@ template <int Dim>
 struct PlacedCell {
   std::array<Vec<Dim>, Dim + 1> rest;  ///< corners [m]
   CurvedEdges curved = 0;
-  QuadraticCell<Dim> x;    ///< columns are nodes, corners first; those of straight edges are not read [m]
-  QuadraticCell<Dim> way;  ///< from the predictor, where there is inertia [m]
-  int level = 0;           ///< of quadrature, where edges are curved
+  QuadraticCell<Dim> x;     ///< columns are nodes, corners first; those of straight edges are not read [m]
+  QuadraticCell<Dim> step;  ///< from the predictor, where there is inertia [m]
+  int level = 0;            ///< of quadrature, where edges are curved
 };
 
 /// Sums elasticity with its validity barrier, inertia and dead loads over cells: value, gradient and Hessian by nodes that

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/kept_vector.hpp"
 #include "core/profile.hpp"
+#include "core/scratch_vector.hpp"
 #include "round_off.hpp"
 
 namespace itr {
@@ -14,17 +14,17 @@ namespace itr {
 namespace {
 constexpr std::string_view kAssembly = "assembly";
 
-struct SecondWays {  // which say that two terms can tell
-  KeptVector ways;
+struct SecondSteps {  // which say that two terms can tell
+  ScratchVector steps;
 };
-struct PartOfWay {
-  KeptVector dx;
+struct PartOfStep {
+  ScratchVector dx;
 };
 struct TermScratch {
-  KeptVector gradient;
+  ScratchVector gradient;
 };
 struct RoundOffScratch {
-  KeptVector x, gradient;
+  ScratchVector x, gradient;
 };
 }  // namespace
 
@@ -56,7 +56,7 @@ void Energy::add_gradient_round_off(ConstVectorView x, VectorView round_off, Wor
 
 double Energy::max_step(ConstVectorView, ConstVectorView, Workspace&) const { return 1; }
 
-bool Energy::get_single_ways(ConstVectorView, ConstVectorView, VectorView, Workspace&) const { return false; }
+bool Energy::get_vertex_steps(ConstVectorView, ConstVectorView, VectorView, Workspace&) const { return false; }
 
 bool Energy::find_blocking(ConstVectorView, ConstVectorView, double, BlockingPairs&, Workspace&) const { return false; }
 
@@ -101,9 +101,9 @@ double EnergySum::value_round_off(ConstVectorView x, Workspace& workspace) const
 double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   const ScopedPhase phase("ccd");
   double step = 1;
-  auto& kept = workspace.get<PartOfWay>().dx;
-  KeptVector part = std::move(kept);  // a term may be a sum itself
-  for (const auto& term : terms_) {   // each is asked only about the part of the way that those before it leave
+  auto& kept = workspace.get<PartOfStep>().dx;
+  ScratchVector part = std::move(kept);  // a term may be a sum itself
+  for (const auto& term : terms_) {      // each is asked only about the part of the way that those before it leave
     const double fraction = step < 1 ? term->max_step(x, part.view(), workspace) : term->max_step(x, dx, workspace);
     if (fraction == 1) continue;
     step *= fraction;
@@ -113,11 +113,11 @@ double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& wor
   return step;
 }
 
-bool EnergySum::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const {
+bool EnergySum::get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const {
   bool has_told = false;
   for (const auto& term : terms_) {
-    VectorView own = has_told ? workspace.get<SecondWays>().ways.resize(dx.size()) : ways;
-    const bool tells = term->get_single_ways(x, dx, own, workspace);
+    VectorView own = has_told ? workspace.get<SecondSteps>().steps.resize(dx.size()) : steps;
+    const bool tells = term->get_vertex_steps(x, dx, own, workspace);
     if (!tells && term->max_step(x, dx, workspace) == 1) continue;
     if (!tells || has_told) return false;
     has_told = true;
@@ -125,10 +125,10 @@ bool EnergySum::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorVie
   return has_told;
 }
 
-bool EnergySum::find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+bool EnergySum::find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                               Workspace& workspace) const {
   return std::any_of(terms_.begin(), terms_.end(),
-                     [&](const auto& term) { return term->find_blocking(x, dx, share, blocking, workspace); });
+                     [&](const auto& term) { return term->find_blocking(x, dx, fraction, blocking, workspace); });
 }
 
 }  // namespace itr

@@ -30,9 +30,9 @@ class EnergySum final : public Energy {
   double value_round_off(ConstVectorView x, Workspace& workspace) const override;
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Asks the one term that can tell; false where another cuts dx short.
-  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
   /// Asks the first term that can tell.
-  bool find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
 
  private:

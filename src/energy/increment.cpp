@@ -10,13 +10,13 @@ namespace itr {
 
 namespace {
 struct PositionScratch {
-  KeptVector x;
+  ScratchVector x;
 };
 struct TermScratch {
-  KeptVector gradient;
+  ScratchVector gradient;
 };
 struct RoundOffScratch {
-  KeptVector base, d, gradient;
+  ScratchVector base, d, gradient;
 };
 }  // namespace
 
@@ -106,13 +106,14 @@ double EnergyOfIncrement::max_step(ConstVectorView d, ConstVectorView dx, Worksp
   return sum_.max_step(positions(d, workspace), dx, workspace);
 }
 
-bool EnergyOfIncrement::get_single_ways(ConstVectorView d, ConstVectorView dx, VectorView ways, Workspace& workspace) const {
-  return sum_.get_single_ways(positions(d, workspace), dx, ways, workspace);
+bool EnergyOfIncrement::get_vertex_steps(ConstVectorView d, ConstVectorView dx, VectorView steps,
+                                         Workspace& workspace) const {
+  return sum_.get_vertex_steps(positions(d, workspace), dx, steps, workspace);
 }
 
-bool EnergyOfIncrement::find_blocking(ConstVectorView d, ConstVectorView dx, double share, BlockingPairs& blocking,
+bool EnergyOfIncrement::find_blocking(ConstVectorView d, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                                       Workspace& workspace) const {
-  return sum_.find_blocking(positions(d, workspace), dx, share, blocking, workspace);
+  return sum_.find_blocking(positions(d, workspace), dx, fraction, blocking, workspace);
 }
 
 }  // namespace itr

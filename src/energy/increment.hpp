@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/energy.hpp"
 
 namespace itr {
@@ -40,8 +40,8 @@ class EnergyOfIncrement final : public Energy {
   double value_round_off(ConstVectorView d, Workspace& workspace) const override;
   void add_gradient_round_off(ConstVectorView d, VectorView round_off, Workspace& workspace) const override;
   double max_step(ConstVectorView d, ConstVectorView dx, Workspace& workspace) const override;
-  bool get_single_ways(ConstVectorView d, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
-  bool find_blocking(ConstVectorView d, ConstVectorView dx, double share, BlockingPairs& blocking,
+  bool get_vertex_steps(ConstVectorView d, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
+  bool find_blocking(ConstVectorView d, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
 
  private:

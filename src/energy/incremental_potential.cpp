@@ -22,7 +22,7 @@ void renew_term(std::shared_ptr<Term>& term, bool is_needed, const auto& cells, 
 
 /// The friction that was lagged last: made anew where nothing refers to it any more.
 template <int Dim>
-struct KeptFriction {
+struct FrictionScratch {
   std::shared_ptr<FrictionEnergy<Dim>> last;
 };
 
@@ -78,7 +78,7 @@ bool IncrementalPotential<Dim>::has_friction() const {
 template <int Dim>
 std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& workspace) const {
   if (!has_friction()) return nullptr;
-  auto& friction = workspace.get<KeptFriction<Dim>>().last;
+  auto& friction = workspace.get<FrictionScratch<Dim>>().last;
   if (!friction || friction.use_count() > 1) friction = std::make_shared<FrictionEnergy<Dim>>();
   const auto lag = [&](ConstVectorView at, ConstVectorView reference) {
     friction->renew(*contact_, at, workspace, terms_->contact, terms_->velocity_rate, reference, terms_->scaling);

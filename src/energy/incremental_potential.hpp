@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/contact/contact.hpp"
 #include "energy/contact/friction.hpp"
 #include "energy/damping.hpp"
@@ -91,7 +91,7 @@ class IncrementalPotential {
 
   const PotentialTerms<Dim>* terms_;
   const CellSet<Dim>& cells_;
-  KeptVector velocity_reference_;  ///< as in PotentialHistory
+  ScratchVector velocity_reference_;  ///< as in PotentialHistory
   std::shared_ptr<const VertexMap<Dim>> map_;
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kBlock = 256;
 
 struct FromPredictor {
-  KeptVector distance;
+  ScratchVector distance;
 };
 }  // namespace
 

@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/energy.hpp"
 #include "energy/increment.hpp"
 #include "fem/cell_set.hpp"
@@ -68,8 +68,8 @@ class InertiaEnergy final : public Energy, public IncrementalTerm {
   std::vector<Mat<kQuadraticNodes<Dim>>> matrices_;  ///< by unit mass: one a set of curved edges, or one an element
   std::vector<CurvedMass> curved_mass_;
   MassKind kind_ = MassKind::consistent;
-  KeptVector predictor_, predicted_increment_;  ///< the second is empty where none is given
-  KeptVector residual_;                         ///< empty: none
+  ScratchVector predictor_, predicted_increment_;  ///< the second is empty where none is given
+  ScratchVector residual_;                         ///< empty: none
   double loss_ = 0;
 };
 

@@ -18,10 +18,10 @@ namespace itr {
 
 namespace {
 
-constexpr double kShare = 10;          ///< of the forces by the size: a step moves a body by a tenth of its size at most
-constexpr double kLeastLeft = 1e-5;    ///< of the forces that act, below which sigma fades no more
-constexpr double kLeastShare = 1e-12;  ///< of the elastic stiffness: what a factorisation resolves
-constexpr double kHeld = 1e-8;         ///< of the best held rigid motion: what is held less is free
+constexpr double kFraction = 10;          ///< of the forces by the size: a step moves a body by a tenth of its size at most
+constexpr double kLeastLeft = 1e-5;       ///< of the forces that act, below which sigma fades no more
+constexpr double kLeastFraction = 1e-12;  ///< of the elastic stiffness: what a factorisation resolves
+constexpr double kHeld = 1e-8;            ///< of the best held rigid motion: what is held less is free
 
 template <int Dim>
 inline constexpr int kRigidModes = Dim == 2 ? 3 : 6;
@@ -146,7 +146,7 @@ void LeastMotion<Dim>::follow(ConstVectorView gradient, ConstVectorView sizes, c
         if (dofs.unknown[i] != kNone) left += std::abs(gradient[i]);
       }
     const double fade = acting > 0 ? std::clamp(left / acting, kLeastLeft, 1.0) : 1;
-    part.stiffness = std::max(kShare * fade * acting / part.size, kLeastShare * scaling_ * part.modulus);
+    part.stiffness = std::max(kFraction * fade * acting / part.size, kLeastFraction * scaling_ * part.modulus);
   }
 }
 
@@ -165,8 +165,8 @@ void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& 
 }
 
 template <int Dim>
-bool LeastMotion<Dim>::get_single_ways(ConstVectorView, ConstVectorView dx, VectorView ways, Workspace&) const {
-  ways = dx;
+bool LeastMotion<Dim>::get_vertex_steps(ConstVectorView, ConstVectorView dx, VectorView steps, Workspace&) const {
+  steps = dx;
   return true;
 }
 

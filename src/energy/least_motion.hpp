@@ -49,7 +49,7 @@ class LeastMotion final : public Energy {
   void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   /// Asks for nothing: vertices that go alone would turn and shift the body.
-  bool get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
 
  private:
   const CellSet<Dim>& cells_;

@@ -42,7 +42,7 @@ void add_forces(const Simplex& simplex, const CellSet<Dim>& cells, double measur
   for (const auto& point : quadrature<SimplexDim>(kMassDegree)) {
     Vec<Dim> X = Vec<Dim>::Zero();
     for (int k = 0; k <= SimplexDim; ++k) X += point.weights[k] * rest[k];
-    const Vec<Dim> f = point.share * measure * density(X) * load(RestPoint<Dim>(X, inward, simplex.part));
+    const Vec<Dim> f = point.fraction * measure * density(X) * load(RestPoint<Dim>(X, inward, simplex.part));
     const auto shapes = quadratic_shapes<SimplexDim>(simplex.curved, point.weights);
     for (int k = 0; k < kQuadraticNodes<SimplexDim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * f;
   }

@@ -4,7 +4,7 @@
 #include <functional>
 #include <map>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/energy.hpp"
 #include "energy/increment.hpp"
 #include "fem/cell_set.hpp"
@@ -51,7 +51,7 @@ class LoadEnergy final : public Energy, public IncrementalTerm {
 
  private:
   const CellSet<Dim>& cells_;
-  KeptVector forces_;
+  ScratchVector forces_;
   double rest_work_ = 0;  ///< f . X
   double scale_ = 1;
 };

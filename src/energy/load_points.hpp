@@ -25,8 +25,8 @@ struct LoadPoint {
 inline double facet_area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
 inline double facet_area(const std::array<Vec<3>, 3>& p) { return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); }
 
-/// Calls visit(point, force) with the share of the total `weight * load` that acts at each point of a cell or a facet of a
-/// connected part.
+/// Calls visit(point, force) with the fraction of the total `weight * load` that acts at each point of a cell or a facet of
+/// a connected part.
 template <int Dim, std::size_t Vertices, typename Load, typename Visit>
 void for_each_load_point(const std::array<Vec<Dim>, Vertices>& rest, int part, double weight, const Load& load,
                          const Visit& visit) {

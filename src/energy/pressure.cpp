@@ -33,11 +33,11 @@ Mat<3> cone_gradient(const Mat<3>& p) {
 
 /// Force of a unit pressure on each corner, up to its sign: area times normal over the number of corners. At corners of
 /// curved_corners it is the force on the whole facet, as if x's normal were everywhere.
-Vec<2> corner_share(const Mat<2>& p) {
+Vec<2> corner_fraction(const Mat<2>& p) {
   const Vec<2> edge = p.col(1) - p.col(0);
   return Vec<2>(edge[1], -edge[0]) / 2;
 }
-Vec<3> corner_share(const Mat<3>& p) { return (p.col(1) - p.col(0)).cross(p.col(2) - p.col(0)) / 6; }
+Vec<3> corner_fraction(const Mat<3>& p) { return (p.col(1) - p.col(0)).cross(p.col(2) - p.col(0)) / 6; }
 
 Mat<4> cone_hessian(const Mat<2>&) {
   Mat<4> hessian = Mat<4>::Zero();
@@ -113,14 +113,14 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
   for (const LoadedFacet& facet : facets_) {
     const Corners p = corners(facet, lagged_x);
     const Corners gradient = cone_gradient(p);
-    const Vec<Dim> share = corner_share(p);
-    largest_force_ = std::max(largest_force_, std::abs(facet.pressure) * share.norm());
+    const Vec<Dim> fraction = corner_fraction(p);
+    largest_force_ = std::max(largest_force_, std::abs(facet.pressure) * fraction.norm());
     for (int k = 0; k < Dim; ++k)
-      correction_.segment<Dim>(Dim * facet.vertices[k]) += facet.pressure * (share - gradient.col(k));
+      correction_.segment<Dim>(Dim * facet.vertices[k]) += facet.pressure * (fraction - gradient.col(k));
   }
   for_each_cone(lagged_x, [&](const CurvedLoadedFacet& facet, double pressure, const auto& weights, const Corners& p) {
     const Corners gradient = cone_gradient(p);
-    const Vec<Dim> normal = Dim * corner_share(p);
+    const Vec<Dim> normal = Dim * corner_fraction(p);
     largest_force_ = std::max(largest_force_, std::abs(facet.pressure) * normal.norm() / Dim);
     for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
       correction_.segment<Dim>(Dim * facet.nodes[n]) +=
@@ -151,7 +151,7 @@ void PressureEnergy<Dim>::for_each_cone(ConstVectorView x, const F& f) const {
     nodes.colwise() -= origin_;
     for (const auto& point : quadrature<Dim - 1>(kDegree)) {
       const CornerWeights<Dim> weights = corner_weights<Dim>(facet.curved, point.weights);
-      f(facet, facet.pressure * point.share, weights, Corners(nodes * weights));
+      f(facet, facet.pressure * point.fraction, weights, Corners(nodes * weights));
     }
   }
 }

@@ -56,7 +56,7 @@ void SparseAssembler::reset(const DofMap& dofs, int dim, std::vector<Stencils> s
   gathers_.clear();
   unknown_ = dofs.unknown;
   stencils_ = std::move(stencils);
-  kept_.assign(stencils_.size(), {});
+  cached_.assign(stencils_.size(), {});
   dim_ = dim;
   const std::size_t num_vertices = unknown_.size() / dim;
   std::vector<std::vector<int>> neighbors(num_vertices);  // and the vertex itself: without cells it still has a diagonal
@@ -134,13 +134,13 @@ void SparseAssembler::add_batch(std::size_t kind, std::size_t first, const doubl
   });
 }
 
-bool SparseAssembler::add_kept(std::size_t kind, std::span<const double> factors, std::span<const double> block) {
-  if (kind >= kept_.size()) return false;
-  const Kept& kept = kept_[kind];
-  if (kept.factors.empty() || !std::ranges::equal(kept.factors, factors) || !std::ranges::equal(kept.block, block))
+bool SparseAssembler::add_cached(std::size_t kind, std::span<const double> factors, std::span<const double> block) {
+  if (kind >= cached_.size()) return false;
+  const Cached& cached = cached_[kind];
+  if (cached.factors.empty() || !std::ranges::equal(cached.factors, factors) || !std::ranges::equal(cached.block, block))
     return false;
-  parallel_blocks(kept.sum.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) values_[place(static_cast<int>(k))] += kept.sum[k];
+  parallel_blocks(cached.sum.size(), kEntriesPerTask, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) values_[place(static_cast<int>(k))] += cached.sum[k];
   });
   return true;
 }
@@ -151,14 +151,14 @@ void SparseAssembler::begin_keeping() {
 }
 
 void SparseAssembler::end_keeping(std::size_t kind, std::span<const double> factors, std::span<const double> block) {
-  kept_.resize(std::max(kept_.size(), kind + 1));
-  Kept& kept = kept_[kind];
-  kept.factors.assign(factors.begin(), factors.end());
-  kept.block.assign(block.begin(), block.end());
-  kept.sum.resize(base_.row_indices.size());
-  for (std::size_t k = 0; k < kept.sum.size(); ++k) kept.sum[k] = values_[place(static_cast<int>(k))];
+  cached_.resize(std::max(cached_.size(), kind + 1));
+  Cached& cached = cached_[kind];
+  cached.factors.assign(factors.begin(), factors.end());
+  cached.block.assign(block.begin(), block.end());
+  cached.sum.resize(base_.row_indices.size());
+  for (std::size_t k = 0; k < cached.sum.size(); ++k) cached.sum[k] = values_[place(static_cast<int>(k))];
   values_ = others_;
-  add_kept(kind, factors, block);
+  add_cached(kind, factors, block);
 }
 
 void SparseAssembler::begin() {

@@ -50,7 +50,7 @@ class SparseAssembler {
   /// A part of the matrix that is the same each time, for each base stencil of one kind a factor times a block that follows
   /// from the stencil and `block`: adds the sum that was kept, if it is of these and the stencils are still those that it
   /// was kept with.
-  bool add_kept(std::size_t kind, std::span<const double> factors, std::span<const double> block);
+  bool add_cached(std::size_t kind, std::span<const double> factors, std::span<const double> block);
   /// Begins and ends a part, added to entries of the base pattern only, that is kept as the sum of these blocks.
   void begin_keeping();
   void end_keeping(std::size_t kind, std::span<const double> factors, std::span<const double> block);
@@ -70,7 +70,7 @@ class SparseAssembler {
     std::vector<int> nonzero, offset, source;
   };
   /// Kept part, by the base's entries, and the blocks that it is the sum of; without factors: nothing is kept.
-  struct Kept {
+  struct Cached {
     std::vector<double> sum, factors, block;
   };
   const Gather& gather(std::size_t kind, std::size_t batch);
@@ -88,7 +88,7 @@ class SparseAssembler {
   linear::SparsityPattern base_;
   std::vector<int> place_;                    ///< of the base's entries in the present pattern; empty: the same
   std::vector<std::vector<Gather>> gathers_;  ///< by kind
-  std::vector<Kept> kept_;                    ///< by kind
+  std::vector<Cached> cached_;                ///< by kind
   std::vector<double> others_;                ///< what was there before begin_keeping
 };
 
@@ -250,7 +250,7 @@ template <int Dim, typename Element, typename NodesOf, typename Fill>
 void HessianSink::add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
                                std::span<const double> factors, std::span<const double> block, const Fill& fill) {
   if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, ids_of, fill);
-  if (sparse_->add_kept(kind, factors, block)) return;
+  if (sparse_->add_cached(kind, factors, block)) return;
   sparse_->begin_keeping();
   add_blocks<Dim>(kind, elements, ids_of, fill);
   sparse_->end_keeping(kind, factors, block);

@@ -48,7 +48,7 @@ Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std:
   const auto& rule = quadrature<Dim>(kMassDegree);
   double total = 0;
   for (std::size_t q = 0; q < rule.size(); ++q) {
-    const double weight = rule[q].share * (density.empty() ? 1 : density[q]);
+    const double weight = rule[q].fraction * (density.empty() ? 1 : density[q]);
     const auto shapes = quadratic_shapes<Dim>(curved, rule[q].weights);
     mass += weight * shapes * shapes.transpose();
     total += weight;

@@ -18,10 +18,10 @@ using Rule = std::vector<QuadraturePoint<Dim>>;
 
 /// Adds all points whose coordinates are these in some order.
 template <int Dim>
-void add_orbit(std::array<double, Dim + 1> coordinates, double share, Rule<Dim>& rule) {
+void add_orbit(std::array<double, Dim + 1> coordinates, double fraction, Rule<Dim>& rule) {
   std::sort(coordinates.begin(), coordinates.end());
   do {
-    rule.push_back({coordinates, share});
+    rule.push_back({coordinates, fraction});
   } while (std::next_permutation(coordinates.begin(), coordinates.end()));
 }
 
@@ -42,8 +42,8 @@ Rule<1> make_rule(int degree, std::array<double, 2>) {
 
 Rule<2> make_rule(int degree, std::array<double, 3>) {
   Rule<2> rule;
-  const auto add = [&](double a, double share) { add_orbit<2>({a, a, 1 - 2 * a}, share, rule); };
-  const auto add_center = [&](double share) { rule.push_back({{1.0 / 3, 1.0 / 3, 1.0 / 3}, share}); };
+  const auto add = [&](double a, double fraction) { add_orbit<2>({a, a, 1 - 2 * a}, fraction, rule); };
+  const auto add_center = [&](double fraction) { rule.push_back({{1.0 / 3, 1.0 / 3, 1.0 / 3}, fraction}); };
   if (degree <= 1) {
     add_center(1);
   } else if (degree == 2) {
@@ -62,7 +62,7 @@ Rule<2> make_rule(int degree, std::array<double, 3>) {
 
 Rule<3> make_rule(int degree, std::array<double, 4>) {
   Rule<3> rule;
-  const auto add = [&](double a, double share) { add_orbit<3>({a, a, a, 1 - 3 * a}, share, rule); };
+  const auto add = [&](double a, double fraction) { add_orbit<3>({a, a, a, 1 - 3 * a}, fraction, rule); };
   if (degree <= 1) {
     rule.push_back({{0.25, 0.25, 0.25, 0.25}, 1});
   } else if (degree == 2) {
@@ -151,7 +151,7 @@ Rule<Dim> on_refined(const Rule<Dim>& rule, int refinements) {
       std::array<double, Dim + 1> weights{};
       for (int corner = 0; corner <= Dim; ++corner)
         for (int k = 0; k <= Dim; ++k) weights[k] += point.weights[corner] * part[corner][k];
-      result.push_back({weights, point.share / static_cast<double>(parts.size())});
+      result.push_back({weights, point.fraction / static_cast<double>(parts.size())});
     }
   return result;
 }

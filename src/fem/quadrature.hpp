@@ -12,7 +12,7 @@ namespace itr {
 template <int Dim>
 struct QuadraturePoint {
   std::array<double, Dim + 1> weights;  ///< barycentric coordinates
-  double share;                         ///< of the simplex' measure
+  double fraction;                      ///< of the simplex' measure
 };
 
 /// A rule that is exact for polynomials of `degree` (1 to 5) on a simplex of dimension 1, 2 or 3. Throws InputError for

@@ -17,7 +17,7 @@ namespace itr {
 namespace {
 
 constexpr double kParallel = 1e-24;  ///< squared sine of the angle of edges that count as parallel
-/// Closest points that are outside a feature by less than this share of the distance count as inside: the distance is the
+/// Closest points that are outside a feature by less than this fraction of the distance count as inside: the distance is the
 /// same to its square, its gradient to this, and round-off does not decide between the features' second derivatives, which
 /// differ.
 constexpr double kOnBoundary = 1e-9;

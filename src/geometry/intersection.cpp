@@ -16,7 +16,7 @@ struct Corner {
   Vec<Dim + 1> in_a, in_b;
 };
 
-/// Clips a simplex by one plane of b after another, depth first, and gives what is left, with its share of a, to a sink.
+/// Clips a simplex by one plane of b after another, depth first, and gives what is left, with its fraction of a, to a sink.
 template <int Dim, typename Sink>
 class Clipper {
  public:
@@ -45,8 +45,8 @@ class Clipper {
   };
 
   static Corner<Dim> cut_edge(const Corner<Dim>& in, const Corner<Dim>& out, int plane) {
-    const double share = in.in_b[plane] / (in.in_b[plane] - out.in_b[plane]);
-    Corner<Dim> point{in.in_a + share * (out.in_a - in.in_a), in.in_b + share * (out.in_b - in.in_b)};
+    const double fraction = in.in_b[plane] / (in.in_b[plane] - out.in_b[plane]);
+    Corner<Dim> point{in.in_a + fraction * (out.in_a - in.in_a), in.in_b + fraction * (out.in_b - in.in_b)};
     point.in_b[plane] = 0;
     return point;
   }
@@ -61,9 +61,9 @@ class Clipper {
   void add(const Piece& piece) {
     Mat<Dim> edges;
     for (int k = 0; k < Dim; ++k) edges.col(k) = piece[k + 1].in_a.template tail<Dim>() - piece[0].in_a.template tail<Dim>();
-    const double share = std::abs(edges.determinant());
-    if (share < kRoundOff) return;
-    sink_.add(piece, share);
+    const double fraction = std::abs(edges.determinant());
+    if (fraction < kRoundOff) return;
+    sink_.add(piece, fraction);
   }
 
   Sink& sink_;
@@ -77,19 +77,19 @@ template <int Dim>
 struct ProductSink {
   OverlapIntegrals<Dim>& sum;
 
-  void add(const Piece<Dim>& piece, double share) {
+  void add(const Piece<Dim>& piece, double fraction) {
     Vec<Dim + 1> total_a = Vec<Dim + 1>::Zero(), total_b = Vec<Dim + 1>::Zero();
     for (const auto& corner : piece) {
       total_a += corner.in_a;
       total_b += corner.in_b;
-      add_products(share, corner.in_a, corner.in_b);
+      add_products(fraction, corner.in_a, corner.in_b);
     }
-    add_products(share, total_a, total_b);
+    add_products(fraction, total_a, total_b);
   }
-  void add_products(double share, const Vec<Dim + 1>& a, const Vec<Dim + 1>& b) {
-    sum.aa.noalias() += share * a * a.transpose();
-    sum.ab.noalias() += share * a * b.transpose();
-    sum.bb.noalias() += share * b * b.transpose();
+  void add_products(double fraction, const Vec<Dim + 1>& a, const Vec<Dim + 1>& b) {
+    sum.aa.noalias() += fraction * a * a.transpose();
+    sum.ab.noalias() += fraction * a * b.transpose();
+    sum.bb.noalias() += fraction * b * b.transpose();
   }
 };
 
@@ -98,13 +98,13 @@ struct ListSink {
   std::vector<OverlapPiece<Dim>>& pieces;
   double volume;  ///< of a
 
-  void add(const Piece<Dim>& piece, double share) {
+  void add(const Piece<Dim>& piece, double fraction) {
     OverlapPiece<Dim>& listed = pieces.emplace_back();
     for (int k = 0; k <= Dim; ++k) {
       listed.in_a[k] = piece[k].in_a;
       listed.in_b[k] = piece[k].in_b;
     }
-    listed.volume = share * volume;
+    listed.volume = fraction * volume;
   }
 };
 

@@ -76,14 +76,14 @@ Mat<Dim> as_matrix(const Jacobian<double, Dim>& J) {
 /// A cheap proof for what moves little: J = J0 (I + E), and det (I + E) > 0 while |E| < 1. E is linear in place and in time,
 /// so that its norm is largest at a corner.
 template <int Dim>
-bool varies_little(const JacobianCorners<double, Dim, 2>& way, double offset) {
+bool varies_little(const JacobianCorners<double, Dim, 2>& step, double offset) {
   constexpr double kMost = 0.9, kMostRoundOff = 0.01;
   Mat<Dim> middle = Mat<Dim>::Zero();
-  for (const auto& J : way[0]) middle += as_matrix<Dim>(J) / (Dim + 1);
+  for (const auto& J : step[0]) middle += as_matrix<Dim>(J) / (Dim + 1);
   if (!(middle.determinant() > 0)) return false;
   const Mat<Dim> inverse = middle.inverse();
   if (!(inverse.norm() * offset * kUnits < kMostRoundOff)) return false;
-  for (const auto& at_time : way)
+  for (const auto& at_time : step)
     for (const auto& J : at_time)
       if (!((inverse * (as_matrix<Dim>(J) - middle)).squaredNorm() < kMost * kMost)) return false;
   return true;
@@ -118,15 +118,15 @@ bool varies_little(const QuadraticCell<Dim>& x, double most) {
 template <int Dim>
 double max_positive_step(const QuadraticCell<Dim>& x, const QuadraticCell<Dim>& dx, double tolerance) {
   const QuadraticCell<Dim> end = x + dx;
-  const JacobianCorners<double, Dim, 2> way{jacobians<double, Dim>(x), jacobians<double, Dim>(end)};
+  const JacobianCorners<double, Dim, 2> step{jacobians<double, Dim>(x), jacobians<double, Dim>(end)};
   const double offset = std::max(largest_offset<Dim>(x), largest_offset<Dim>(end));
-  if (varies_little<Dim>(way, offset)) return 1;
-  const double error = round_off<Dim, 2>(way, offset);
+  if (varies_little<Dim>(step, offset)) return 1;
+  const double error = round_off<Dim, 2>(step, offset);
   const auto is_free = [&](double from, double to) {
     JacobianCorners<double, Dim, 2> part;
     for (int v = 0; v <= Dim; ++v) {
-      part[0][v] = between<double, Dim>(way[0][v], way[1][v], from);
-      part[1][v] = between<double, Dim>(way[0][v], way[1][v], to);
+      part[0][v] = between<double, Dim>(step[0][v], step[1][v], from);
+      part[1][v] = between<double, Dim>(step[0][v], step[1][v], to);
     }
     return is_above<double, Dim, 2>(part, error, kMotionDepth);
   };

@@ -91,8 +91,8 @@ class ConjugateGradients {
       const int k = iterations_;
       if (!precondition(r_, z_)) return End::too_slow;
       const double before = std::exchange(product, dot(r_, z_));
-      const double share = k == 1 ? 0 : product / before;
-      for (std::size_t i = 0; i < n; ++i) p_[i] = z_[i] + share * p_[i];
+      const double fraction = k == 1 ? 0 : product / before;
+      for (std::size_t i = 0; i < n; ++i) p_[i] = z_[i] + fraction * p_[i];
       multiply(system, p_, q_);
       const double curvature = dot(p_, q_);
       if (product > 0 && curvature < -kCertain * norm(p_) * norm(q_)) return End::negative;

@@ -18,7 +18,7 @@ namespace {
 // flops, and memory that a solve streams. Only their ratios matter.
 constexpr double kFlops = 3e10, kEntries = 1e8, kBytes = 2.5e10;
 
-constexpr double kWorthTrying = 0.7;  ///< share of a factorisation that iterations may cost
+constexpr double kWorthTrying = 0.7;  ///< fraction of a factorisation that iterations may cost
 constexpr int kFewest = 4;            ///< iterations without which none is tried
 constexpr int kLongestPause = 8;
 constexpr double kWholeSystem = 1e-8;  ///< residual of a system that counts as one

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
-#include "held_motion.hpp"
+#include "dirichlet_continuation.hpp"
 
 namespace itr {
 
-constexpr double kNothing = 1e-10;     ///< see NewtonExtras::way_to_start
+constexpr double kNothing = 1e-10;     ///< see NewtonExtras::step_to_start
 constexpr double kVanishing = 1e-140;  ///< squares of smaller numbers are no numbers any more
 constexpr double kFloor = 8;           ///< times the round-off of the gradient: no step can be told to improve it
 constexpr double kFarAbove = 1e4;      ///< the same: a larger residual is an error, not round-off
@@ -21,7 +21,7 @@ constexpr double kNear = 10;           ///< times a tolerance
 /// The tests by which a solve ends. None holds before held dofs are at their targets.
 class Convergence {
  public:
-  Convergence(const Task& task, const Iterate& at, const HeldMotion& held) : task_(task), at_(at), held_(held) {}
+  Convergence(const Task& task, const Iterate& at, const DirichletContinuation& held) : task_(task), at_(at), held_(held) {}
 
   bool has_small_gradient() {
     if (!held_.is_done()) return false;
@@ -30,7 +30,7 @@ class Convergence {
     if (first_gradient_ < 0) first_gradient_ = now;
     if (now <= std::max(force_asked(), kVanishing)) return true;
     if (!is_first()) return now < options.gradient_tolerance || now < options.relative_gradient_tolerance * first_gradient_;
-    if (begins_elsewhere() && now > kNothing * task_.norms.of_gradient(task_.extras.gradient_of_way)) return false;
+    if (begins_elsewhere() && now > kNothing * task_.norms.of_gradient(task_.extras.gradient_of_step)) return false;
     return now < options.first_gradient_tolerance;
   }
   /// Which test a full step passes, if one: its length, its decrement, or that nothing is left to improve.
@@ -77,7 +77,7 @@ class Convergence {
     gradient_of_decrement_ = at_.gradient_norm();
   }
   /// The decrement scales with the square of the gradient.
-  void foresee_decrement() {
+  void predict_decrement() {
     if (!(gradient_of_decrement_ > 0)) return;
     const double ratio = at_.gradient_norm() / gradient_of_decrement_;
     decrement_ *= std::min(1.0, ratio * ratio);
@@ -91,12 +91,12 @@ class Convergence {
     return has_other ? 0 : options.force_tolerance * at_.force_size();
   }
   bool is_first() const { return task_.summary.iterations == 0; }
-  bool begins_elsewhere() const { return task_.extras.way_to_start.size() > 0; }
+  bool begins_elsewhere() const { return task_.extras.step_to_start.size() > 0; }
   bool has_small_step(const Step& step) {
     const NewtonOptions& options = task_.options;
     if (first_step_ < 0) first_step_ = step.norm;
     if (!is_first()) return step.norm < options.step_tolerance || step.norm < options.relative_step_tolerance * first_step_;
-    if (begins_elsewhere() && step.norm > kNothing * task_.norms.of_step(task_.extras.way_to_start)) return false;
+    if (begins_elsewhere() && step.norm > kNothing * task_.norms.of_step(task_.extras.step_to_start)) return false;
     return step.norm < options.step_tolerance;
   }
   /// The one rule for round-off: a step that promises less than the energy resolves may still lower the gradient, but not
@@ -115,7 +115,7 @@ class Convergence {
 
   const Task& task_;
   const Iterate& at_;
-  const HeldMotion& held_;
+  const DirichletContinuation& held_;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet
   double decrement_ = 0, gradient_of_decrement_ = 0;
   int unresolved_ = 0;      ///< steps in a row that promised less than the energy resolves

@@ -10,11 +10,11 @@
 
 namespace itr {
 
-constexpr double kLoosest = 1e-4;      ///< residual of a direction
-constexpr int kMostLoose = 8;          ///< iterations of a solve that may be loose
-constexpr double kFirstShare = 1e-13;  ///< of each diagonal entry
-constexpr int kMostShares = 12;        ///< each ten times the one before
-constexpr double kFirstShift = 1e-10;  ///< of the largest: where an entry is 0 or below
+constexpr double kLoosest = 1e-4;         ///< residual of a direction
+constexpr int kMostLoose = 8;             ///< iterations of a solve that may be loose
+constexpr double kFirstFraction = 1e-13;  ///< of each diagonal entry
+constexpr int kMostFractions = 12;        ///< each ten times the one before
+constexpr double kFirstShift = 1e-10;     ///< of the largest: where an entry is 0 or below
 constexpr int kMostShifts = 12;
 constexpr double kMostOfShift = 0.1;  ///< of the curvature along a step that may be the last
 
@@ -28,13 +28,13 @@ inline bool is_curable(linear::Outcome outcome) {
 /// that is shifted until it is. As few digits are asked of it as the iteration can use.
 class Direction {
  public:
-  Direction(const Task& task, const Iterate& at, HeldMotion& held, const Convergence& convergence)
+  Direction(const Task& task, const Iterate& at, DirichletContinuation& held, const Convergence& convergence)
       : task_(task),
         at_(at),
         held_(held),
         convergence_(convergence),
-        kept_(task.workspace.get<Kept>()),
-        step_{kept_.step.resize(at.x().size())} {}
+        scratch_(task.workspace.get<Scratch>()),
+        step_{scratch_.step.resize(at.x().size())} {}
 
   /// False where no Hessian gives a step of descent; failure() says why.
   bool find() {
@@ -52,8 +52,8 @@ class Direction {
       is_projected_ = true;
       if (find_with(PsdProjection::clamp)) return true;
     }
-    for (int attempt = 0; attempt < kMostShares && is_curable(solved_.outcome); ++attempt)
-      if (solve(Shift::share_of_diagonal(kFirstShare * std::pow(10, attempt)))) return true;
+    for (int attempt = 0; attempt < kMostFractions && is_curable(solved_.outcome); ++attempt)
+      if (solve(Shift::fraction_of_diagonal(kFirstFraction * std::pow(10, attempt)))) return true;
     const double scale = std::max(task_.system.diagonal_scale(), 1e-300);
     for (int attempt = 0; attempt < kMostShifts && is_curable(solved_.outcome); ++attempt)
       if (solve(kFirstShift * std::pow(10, attempt) * scale)) return true;
@@ -103,8 +103,8 @@ class Direction {
   const std::string& failure() const { return failure_; }
 
  private:
-  struct Kept {
-    KeptVector step, rhs, solution;
+  struct Scratch {
+    ScratchVector step, rhs, solution;
   };
   /// Relative residual to which a step is solved. The gradient after a Newton step is at best of second order in the one
   /// before, so more digits are wasted (Eisenstat & Walker 1996). Only steps that may end the solve get all digits.
@@ -135,7 +135,7 @@ class Direction {
       return true;
     }
     const ConstVectorView rhs = right_hand_side();
-    VectorView solution = kept_.solution.resize(rhs.size());
+    VectorView solution = scratch_.solution.resize(rhs.size());
     // The solution of an indefinite Hessian must not be used: along eigenvectors of negative eigenvalues, Newton's step goes
     // up to a saddle.
     const bool if_indefinite = task_.options.indefinite == IndefiniteHessian::accept;
@@ -160,9 +160,9 @@ class Direction {
     step_.curvature = descent;
     if (motion.coupling.size() > 0) step_.curvature += 2 * solution.dot(motion.coupling);
     step_.curvature += motion.curvature;
-    for (Eigen::Index i = 0; i < step_.way.size(); ++i)
-      if (task_.dofs.unknown[i] != kNone) step_.way[i] = solution[task_.dofs.unknown[i]];
-    step_.norm = task_.norms.of_step(step_.way);
+    for (Eigen::Index i = 0; i < step_.direction.size(); ++i)
+      if (task_.dofs.unknown[i] != kNone) step_.direction[i] = solution[task_.dofs.unknown[i]];
+    step_.norm = task_.norms.of_step(step_.direction);
     return true;
   }
   /// Sets the step to the prescribed motion of the held dofs, and to zero elsewhere.
@@ -170,12 +170,12 @@ class Direction {
     step_.is_set = true;
     step_.is_of_shift = false;
     if (held_.is_advancing())
-      step_.way = held_.motion().step;
+      step_.direction = held_.motion().step;
     else
-      step_.way.setZero();
+      step_.direction.setZero();
   }
   ConstVectorView right_hand_side() {
-    VectorView rhs = kept_.rhs.resize(task_.dofs.num_unknowns);
+    VectorView rhs = scratch_.rhs.resize(task_.dofs.num_unknowns);
     rhs.setZero();
     if (held_.motion().coupling.size() > 0) rhs -= held_.motion().coupling;
     for (Eigen::Index i = 0; i < at_.x().size(); ++i)
@@ -191,7 +191,7 @@ class Direction {
   /// Whether the Hessian may have become another one since it was assembled: in the first step of a solve, for example.
   bool was_long_step() const {
     constexpr double kLong = 1e-3;  ///< of the whole way
-    return known_at_ != at_.revision() && step_.is_set && step_.way.norm() > kLong * at_.x().norm();
+    return known_at_ != at_.revision() && step_.is_set && step_.direction.norm() > kLong * at_.x().norm();
   }
   bool fail(const std::string& reason) {
     if (!task_.extras.is_brief) failure_ = " (linear solve: " + reason + ")";
@@ -200,9 +200,9 @@ class Direction {
 
   const Task& task_;
   const Iterate& at_;
-  HeldMotion& held_;
+  DirichletContinuation& held_;
   const Convergence& convergence_;
-  Kept& kept_;
+  Scratch& scratch_;
   Step step_;
   linear::SystemReport solved_;  ///< the last system
   std::string failure_;          ///< why the last one failed that did

@@ -81,7 +81,7 @@ struct Task {
 
 /// A full step, and what the quadratic model says of it.
 struct Step {
-  VectorView way;            ///< over all dofs
+  VectorView direction;      ///< over all dofs
   bool is_set = false;       ///< `way` holds a step
   double norm = 0;           ///< of the options
   double curvature = 0;      ///< way^T H way
@@ -92,7 +92,7 @@ struct Step {
 class Iterate {
  public:
   Iterate(const Task& task, VectorView x)
-      : task_(task), x_(x), gradient_(task.workspace.get<Kept>().gradient.resize(x.size())), value_(value_at(x)) {}
+      : task_(task), x_(x), gradient_(task.workspace.get<Scratch>().gradient.resize(x.size())), value_(value_at(x)) {}
 
   const VectorView& x() const { return x_; }
   double value() const { return value_; }
@@ -106,7 +106,7 @@ class Iterate {
   int revision() const { return revision_; }
 
   /// The decrease of energy that the quadratic model promises for a full Newton step.
-  double decrement_of(const Step& step) const { return -0.5 * task_.norms.dot(step.way, gradient_); }
+  double decrement_of(const Step& step) const { return -0.5 * task_.norms.dot(step.direction, gradient_); }
   /// By how much round-off may change the value.
   double value_round_off() const {
     if (value_round_off_at_ != revision_) {
@@ -121,7 +121,7 @@ class Iterate {
   double gradient_round_off() const {
     if (gradient_round_off_at_ != revision_) {
       const ScopedTimer timer(task_.summary.assembly_seconds);
-      VectorView round_off = task_.workspace.get<Kept>().round_off.resize(x_.size());
+      VectorView round_off = task_.workspace.get<Scratch>().round_off.resize(x_.size());
       round_off.setZero();
       task_.energy.add_gradient_round_off(x_, round_off, task_.workspace);
       gradient_round_off_ = task_.norms.of_gradient(round_off);
@@ -148,16 +148,16 @@ class Iterate {
     gradient.setZero();
     task_.energy.add_gradient(x, gradient, task_.workspace);
   }
-  /// Share of a way that is feasible.
-  double free_share(ConstVectorView way) const {
+  /// Fraction of a way that is feasible.
+  double free_fraction(ConstVectorView direction) const {
     const ScopedTimer timer(task_.summary.ccd_seconds);
-    return task_.energy.max_step(x_, way, task_.workspace);
+    return task_.energy.max_step(x_, direction, task_.workspace);
   }
 
   void update_value() { value_ = value_at(x_); }
   void update_gradient() {
     const ScopedTimer timer(task_.summary.assembly_seconds);
-    VectorView sizes = task_.workspace.get<Kept>().sizes.resize(x_.size());
+    VectorView sizes = task_.workspace.get<Scratch>().sizes.resize(x_.size());
     sizes.setZero();
     gradient_.setZero();
     task_.energy.add_gradient_and_sizes(x_, gradient_, sizes, task_.workspace);
@@ -173,8 +173,8 @@ class Iterate {
   }
 
  private:
-  struct Kept {
-    KeptVector gradient, sizes, round_off;
+  struct Scratch {
+    ScratchVector gradient, sizes, round_off;
   };
   const Task& task_;
   VectorView x_, gradient_;

@@ -28,10 +28,10 @@ class Minimizer {
       if (task_.options.is_cancelled()) return stop(Termination::cancelled);
       held_.plan();
       at_.update_gradient();
-      if (held_.is_stuck()) return stop(Termination::no_descent, held_.describe_way_left());
+      if (held_.is_stuck()) return stop(Termination::no_descent, held_.describe_distance_left());
       if (convergence_.has_small_gradient()) {
         if (saddle_.leave()) continue;
-        convergence_.foresee_decrement();
+        convergence_.predict_decrement();
         return finish(Termination::gradient);
       }
       if (!find_direction()) return stop(Termination::no_descent, kNoDirection + direction_.failure());
@@ -43,7 +43,7 @@ class Minimizer {
       if (!search()) {
         const bool at_round_off = convergence_.is_at_round_off();
         if (held_.takes_turns(at_round_off)) {
-          if (held_.is_blocked_for_good()) return stop(Termination::no_descent, held_.describe_way_left());
+          if (held_.is_blocked_for_good()) return stop(Termination::no_descent, held_.describe_distance_left());
           continue;
         }
         if (!at_round_off) return stop(Termination::no_descent, "the line search found no step");
@@ -105,7 +105,7 @@ class Minimizer {
     if (task_.extras.is_brief) return summary_;
     summary_.message = message;
     if (summary_.converged()) return summary_;
-    if (step.is_set) summary_.failed_step = step.way;
+    if (step.is_set) summary_.failed_step = step.direction;
     if (at_.has_gradient()) summary_.worst_dof = find_worst_dof();
     return summary_;
   }
@@ -131,13 +131,13 @@ class Minimizer {
   std::string describe_end_of_iterations() const {
     if (task_.extras.is_brief) return {};
     return "no convergence in " + std::to_string(task_.options.max_iterations) + " iterations" +
-           (held_.is_done() ? "" : ", " + held_.describe_way_left());
+           (held_.is_done() ? "" : ", " + held_.describe_distance_left());
   }
 
   NewtonSummary summary_;
   const Task task_;
   Iterate at_;
-  HeldMotion held_;
+  DirichletContinuation held_;
   Convergence convergence_{task_, at_, held_};
   Direction direction_{task_, at_, held_, convergence_};
   Search search_{task_, at_, held_};

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/energy.hpp"
 #include "itr/options.hpp"
 #include "linear/reuse.hpp"
@@ -18,19 +18,19 @@ namespace itr {
 /// costs solves.
 constexpr double kTightResidual = 1e-8;
 
-/// A shift of a Hessian's diagonal: a number, or a share of each entry. A number large enough for the stiffest entry stops
-/// the motion of all others.
+/// A shift of a Hessian's diagonal: a number, or a fraction of each entry. A number large enough for the stiffest entry
+/// stops the motion of all others.
 struct Shift {
   double value = 0;
-  bool is_share = false;
+  bool is_fraction = false;
   Shift() = default;
   Shift(double number) : value(number) {}  // NOLINT: a number is one
-  static Shift share_of_diagonal(double share) {
-    Shift shift(share);
-    shift.is_share = true;
+  static Shift fraction_of_diagonal(double fraction) {
+    Shift shift(fraction);
+    shift.is_fraction = true;
     return shift;
   }
-  double of(double entry) const { return is_share ? value * std::abs(entry) : value; }
+  double of(double entry) const { return is_fraction ? value * std::abs(entry) : value; }
 };
 
 /// Assembles and solves the Newton system of one solve.
@@ -78,7 +78,7 @@ class DenseSystem final : public NewtonSystem {
 
  private:
   Eigen::Index order_ = 0;
-  KeptVector hessian_, factor_;  ///< by columns
+  ScratchVector hessian_, factor_;  ///< by columns
 };
 
 /// For whole meshes: fixed base pattern of the elements, contacts added as they appear, analysed when the pattern changes.
@@ -172,7 +172,7 @@ struct NewtonExtras {
   /// Where the solve begins elsewhere than the state is: the way from there, and what inertia does along it to the gradient.
   /// The solve has not converged there unless gradient and step are nothing beside these: whatever the tolerances, forces
   /// that just began to act are not passed over. Empty: it begins where the state is.
-  VectorX way_to_start{}, gradient_of_way{};
+  VectorX step_to_start{}, gradient_of_step{};
 };
 
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as

@@ -25,7 +25,7 @@ class Saddle {
         at_(at),
         direction_(direction),
         search_(search),
-        candidate_(task.workspace.get<Kept>().candidate.resize(at.x().size())) {}
+        candidate_(task.workspace.get<Scratch>().candidate.resize(at.x().size())) {}
 
   bool is_here() {
     if (task_.options.indefinite == IndefiniteHessian::accept || !task_.has_unknowns()) return false;
@@ -35,27 +35,27 @@ class Saddle {
   bool leave() { return is_here() && descend(); }
 
  private:
-  struct Kept {
-    KeptVector candidate;
+  struct Scratch {
+    ScratchVector candidate;
   };
   /// Goes along an eigenvector of a negative eigenvalue as long as that lowers the energy.
   bool descend() {
-    VectorView way = direction_.step().way;
-    if (!find_way(way)) return false;
-    for (int k = 0; k < kMostDoublings; ++k, way *= 2) {
-      if (at_.free_share(way) < 1) return false;
-      candidate_ = at_.x() + way;
+    VectorView direction = direction_.step().direction;
+    if (!find_descent(direction)) return false;
+    for (int k = 0; k < kMostDoublings; ++k, direction *= 2) {
+      if (at_.free_fraction(direction) < 1) return false;
+      candidate_ = at_.x() + direction;
       const double value = at_.value_at(candidate_);
       if (!(value < at_.value())) continue;
       at_.move_to(candidate_, value);
-      search_.go_on(way);
+      search_.go_on(direction);
       return true;
     }
     return false;
   }
   /// The shortest step whose change of energy exceeds round-off, down the slope. If the slope is round-off, the sign of the
   /// eigenvector decides, which is the same for all linear solvers; the other branch may be as low.
-  bool find_way(VectorView way) {
+  bool find_descent(VectorView direction) {
     VectorX eigenvector;
     double curvature = 0;
     if (asks_products()) {
@@ -67,12 +67,12 @@ class Saddle {
       curvature = find_negative_curvature(task_.system, task_.dofs.num_unknowns, eigenvector);
     }
     if (!(curvature < 0)) return false;
-    way.setZero();
-    for (Eigen::Index i = 0; i < way.size(); ++i)
-      if (task_.dofs.unknown[i] != kNone) way[i] = eigenvector[task_.dofs.unknown[i]];
+    direction.setZero();
+    for (Eigen::Index i = 0; i < direction.size(); ++i)
+      if (task_.dofs.unknown[i] != kNone) direction[i] = eigenvector[task_.dofs.unknown[i]];
     const double resolved = kResolved * at_.value_round_off();
-    way *= std::max(task_.options.step_tolerance, std::sqrt(2 * resolved / -curvature));
-    if (way.dot(at_.gradient()) > resolved) way = -way;
+    direction *= std::max(task_.options.step_tolerance, std::sqrt(2 * resolved / -curvature));
+    if (direction.dot(at_.gradient()) > resolved) direction = -direction;
     return true;
   }
   /// Iterations may tell of negative curvature that they meet, but those from a symmetric right-hand side meet none without

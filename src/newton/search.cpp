@@ -23,8 +23,8 @@ struct StepOrigin {
 
 constexpr int kMostRounds = 6;            ///< gaps are linearised so often
 constexpr Eigen::Index kMostPairs = 128;  ///< a back-solve each
-constexpr double kAhead = 4;              ///< pairs that stop the step within so many times its free share are bounded
-constexpr double kFreeEnough = 0.5;       ///< share of the step with which it is done
+constexpr double kAhead = 4;              ///< pairs that stop the step within so many times its free fraction are bounded
+constexpr double kFreeEnough = 0.5;       ///< fraction of the step with which it is done
 constexpr double kLongest = 10;           ///< of the step's largest motion: a turned one is not longer
 
 /// Solves for the multipliers l >= 0 of the bounds S l >= asked by Gauss-Seidel. A multiplier is 0 if its bound holds
@@ -47,10 +47,10 @@ VectorX find_multipliers(const MatrixX& S, const VectorX& asked) {
   return l;
 }
 
-/// The quadratic model along a step; `change` is that of its energy at a share of the step.
+/// The quadratic model along a step; `change` is that of its energy at a fraction of the step.
 struct ModelAlong {
   double slope, curvature;
-  double change(double share) const { return share * slope + 0.5 * share * share * curvature; }
+  double change(double fraction) const { return fraction * slope + 0.5 * fraction * fraction * curvature; }
 };
 
 /// Bounds on the gaps of pairs, and the corrections of a step by forces between these pairs.
@@ -99,101 +99,103 @@ class BoundedGaps {
   VectorX asked_;
 };
 
-/// Turns a Newton step of which only `share` is free, so that the pairs that stop it keep a gap at its end. The turned step
-/// is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
-/// programming). Returns the free share of `step`; both stay unchanged if the model gains no more along the turned step.
-double turn_blocked_step(const StepOrigin& origin, VectorView step, double share) {
+/// Turns a Newton step of which only `fraction` is free, so that the pairs that stop it keep a gap at its end. The projected
+/// step is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
+/// programming). Returns the free fraction of `step`; both stay unchanged if the model gains no more along the projected
+/// step.
+double project_step(const StepOrigin& origin, VectorView step, double fraction) {
   const auto& [energy, x, dofs, gradient, system, workspace] = origin;
   const VectorX first = step;
   // The curvature along a Newton step is minus its slope, because H step = -gradient.
   const double slope = gradient.dot(first);
-  double least = ModelAlong{slope, -slope}.change(share), free = share, best_share = share;
-  VectorX way = first, correction = VectorX::Zero(dofs.num_unknowns);
+  double least = ModelAlong{slope, -slope}.change(fraction), free = fraction, best_fraction = fraction;
+  VectorX ahead = first, correction = VectorX::Zero(dofs.num_unknowns);
   BlockingPairs blocking;
   BoundedGaps gaps(dofs, system);
   for (int round = 0; round < kMostRounds; ++round) {
-    if (!energy.find_blocking(x, way, std::min(1.0, kAhead * free), blocking, workspace)) break;
+    if (!energy.find_blocking(x, ahead, std::min(1.0, kAhead * free), blocking, workspace)) break;
     double curvature_of_correction = 0;
     if (!gaps.update(blocking.bounds, correction) || !gaps.correct(correction, curvature_of_correction)) break;
     double slope_of_correction = 0;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       const int unknown = dofs.unknown[i];
       if (unknown == kNone) continue;
-      way[i] = first[i] + correction[unknown];
+      ahead[i] = first[i] + correction[unknown];
       slope_of_correction += gradient[i] * correction[unknown];
     }
     // Nearly dependent bounds ask for forces without limit, and for far motions all pairs are candidates of contact.
-    if (!(way.lpNorm<Eigen::Infinity>() <= kLongest * first.lpNorm<Eigen::Infinity>())) break;
-    free = energy.max_step(x, way, workspace);
+    if (!(ahead.lpNorm<Eigen::Infinity>() <= kLongest * first.lpNorm<Eigen::Infinity>())) break;
+    free = energy.max_step(x, ahead, workspace);
     const ModelAlong model{slope + slope_of_correction, -slope - 2 * slope_of_correction + curvature_of_correction};
     if (model.slope < 0 && model.change(free) < least) {
       least = model.change(free);
-      best_share = free;
-      step = way;
+      best_fraction = free;
+      step = ahead;
     }
     if (free >= kFreeEnough) break;
   }
-  return best_share;
+  return best_fraction;
 }
 
 constexpr double kArmijo = 1e-4;
 constexpr double kResolved = 8;  ///< times its round-off: changes of energy below which slopes tell more
-constexpr double kLeastShare = 1e-14;
+constexpr double kLeastFraction = 1e-14;
 constexpr double kStraightFall = 0.8;  ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostHalvings = 40, kMostDoublings = 12;
-constexpr double kSingleWaysBelow = 0.25, kMuchMore = 2;  ///< see try_single_ways
-constexpr double kBlockedBelow = 0.5;                     ///< share of a step below which what is in the way is looked at
-constexpr int kLong = 20;                                 ///< iterations from which on what blocks steps is kept
-constexpr double kWaitBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
+constexpr double kVertexStepsBelow = 0.25, kMuchMore = 2;  ///< see try_vertex_steps
+constexpr double kBlockedBelow = 0.5;  ///< fraction of a step below which what is in the way is looked at
+constexpr int kLong = 20;              ///< iterations from which on what blocks steps is kept
+constexpr double kWaitBelow = 0.1;     ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 }  // namespace
 
-Search::Search(const Task& task, Iterate& at, HeldMotion& held)
+Search::Search(const Task& task, Iterate& at, DirichletContinuation& held)
     : task_(task),
       at_(at),
       held_(held),
-      kept_(task.workspace.get<Kept>()),
-      candidate_(kept_.candidate.resize(at.x().size())),
-      other_(kept_.other.resize(at.x().size())) {}
+      scratch_(task.workspace.get<Scratch>()),
+      candidate_(scratch_.candidate.resize(at.x().size())),
+      other_(scratch_.other.resize(at.x().size())) {}
 
 bool Search::along(Step& step) {
   const bool advancing = held_.is_advancing();
-  const Way way = look_ahead(step);
-  if (advancing && way.share < kWaitBelow) held_.wait();
-  if (way.share < kBlockedBelow) note_blocked(step);
-  held_.raise_penalty(step, way.slope);
-  double share = way.share;
-  for (int i = 0; i < kMostHalvings && share > kLeastShare; ++i, share /= 2) {
-    candidate_ = at_.x() + share * step.way;
-    if (advancing && share == 1) held_.move_to_targets(candidate_);
+  const Ahead ahead = look_ahead(step);
+  if (advancing && ahead.fraction < kWaitBelow) held_.wait();
+  if (ahead.fraction < kBlockedBelow) note_blocked(step);
+  held_.raise_penalty(step, ahead.slope);
+  double fraction = ahead.fraction;
+  for (int i = 0; i < kMostHalvings && fraction > kLeastFraction; ++i, fraction /= 2) {
+    candidate_ = at_.x() + fraction * step.direction;
+    if (advancing && fraction == 1) held_.move_to_targets(candidate_);
     double value = at_.value_at(candidate_);
-    if (!std::isfinite(value) || !is_acceptable(value, share, way, step)) continue;
-    const bool straight = falls_straight(value, share, way, step);
-    held_.note_share(share);
-    if (way.has_single_ways) try_single_ways(value);
+    if (!std::isfinite(value) || !is_acceptable(value, fraction, ahead, step)) continue;
+    const bool straight = falls_straight(value, fraction, ahead, step);
+    held_.note_fraction(fraction);
+    if (ahead.has_vertex_steps) try_vertex_steps(value);
     at_.move_to(candidate_, value);
-    if (straight) go_on(step.way);
+    if (straight) go_on(step.direction);
     return true;
   }
   return false;
 }
 
-Search::Way Search::look_ahead(Step& step) {
+Search::Ahead Search::look_ahead(Step& step) {
   // Not in patches, which end after a few iterations in any case, and not with PolyFEM's way, which is kept as it is.
-  const bool is_own_way = task_.options.indefinite == IndefiniteHessian::project;
-  const bool may_turn = !task_.extras.is_brief && is_own_way;
+  const bool is_own_step = task_.options.indefinite == IndefiniteHessian::project;
+  const bool may_project = !task_.extras.is_brief && is_own_step;
   const bool advancing = held_.is_advancing();
-  double share = at_.free_share(step.way);
-  bool has_single_ways = false;
+  double fraction = at_.free_fraction(step.direction);
+  bool has_vertex_steps = false;
   {
     const ScopedTimer timer(task_.summary.ccd_seconds);
-    if (share < kBlockedBelow && !advancing && may_turn)
-      share = turn_blocked_step({task_.energy, at_.x(), task_.dofs, at_.gradient(), task_.system, task_.workspace}, step.way,
-                                share);
-    if (share < kSingleWaysBelow && !advancing && is_own_way)
-      has_single_ways = task_.energy.get_single_ways(at_.x(), step.way, kept_.ways.resize(at_.x().size()), task_.workspace);
+    if (fraction < kBlockedBelow && !advancing && may_project)
+      fraction = project_step({task_.energy, at_.x(), task_.dofs, at_.gradient(), task_.system, task_.workspace},
+                              step.direction, fraction);
+    if (fraction < kVertexStepsBelow && !advancing && is_own_step)
+      has_vertex_steps =
+          task_.energy.get_vertex_steps(at_.x(), step.direction, scratch_.steps.resize(at_.x().size()), task_.workspace);
   }
-  return {share, at_.gradient().dot(step.way), has_single_ways};
+  return {fraction, at_.gradient().dot(step.direction), has_vertex_steps};
 }
 
 void Search::note_blocked(const Step& step) {
@@ -203,13 +205,13 @@ void Search::note_blocked(const Step& step) {
   ++summary.blocked;
   if (task_.extras.is_brief || summary.iterations < kLong) return;
   summary.blocked_from = at_.x();
-  summary.blocked_step = step.way;
+  summary.blocked_step = step.direction;
 }
 
-bool Search::is_acceptable(double value, double share, const Way& way, const Step& step) {
+bool Search::is_acceptable(double value, double fraction, const Ahead& ahead, const Step& step) {
   const bool advancing = held_.is_advancing();
-  const double change = held_.merit_change(value - at_.value(), share), slope = held_.merit_slope(way.slope);
-  if (change <= kArmijo * share * slope) return true;
+  const double change = held_.merit_change(value - at_.value(), fraction), slope = held_.merit_slope(ahead.slope);
+  if (change <= kArmijo * fraction * slope) return true;
   if (advancing) return false;
   // PolyFEM's "RobustArmijo" (docs/theory.md, "Tolerances"; Hager & Zhang): if the energy changes little, in either
   // direction, a slope that still falls at the end suffices. This rule refuses full steps to the minimum of a quadratic.
@@ -220,38 +222,38 @@ bool Search::is_acceptable(double value, double share, const Way& way, const Ste
   const double after = slope_at_candidate(step);
   const double resolved = kResolved * at_.value_round_off();
   return after <= kArmijo * slope ||
-         (change_of_energy <= resolved && (value <= at_.value() || -share * slope <= resolved) && after <= -0.5 * slope);
+         (change_of_energy <= resolved && (value <= at_.value() || -fraction * slope <= resolved) && after <= -0.5 * slope);
 }
 
 /// Whether the energy hardly curves over the full step. The slope at the end has to confirm it: values alone are unreliable
 /// near round-off.
-bool Search::falls_straight(double value, double share, const Way& way, const Step& step) {
-  return !held_.is_advancing() && share == 1 && value - at_.value() < kStraightFall * way.slope &&
-         slope_at_candidate(step) < kStraightFall / 2 * way.slope;
+bool Search::falls_straight(double value, double fraction, const Ahead& ahead, const Step& step) {
+  return !held_.is_advancing() && fraction == 1 && value - at_.value() < kStraightFall * ahead.slope &&
+         slope_at_candidate(step) < kStraightFall / 2 * ahead.slope;
 }
 
 double Search::slope_at_candidate(const Step& step) {
   at_.gradient_at(candidate_, other_);
-  return task_.norms.dot(step.way, other_);
+  return task_.norms.dot(step.direction, other_);
 }
 
 /// Moves each vertex as far as it can go alone, if the energy falls by much more there. Not if cells invert on the way: this
 /// leads to squeezed cells, which take more iterations than it saves.
-void Search::try_single_ways(double& value) {
-  const VectorView ways = kept_.ways.view();
-  if (at_.free_share(ways) < 1) return;
-  other_ = at_.x() + ways;
+void Search::try_vertex_steps(double& value) {
+  const VectorView steps = scratch_.steps.view();
+  if (at_.free_fraction(steps) < 1) return;
+  other_ = at_.x() + steps;
   const double there = at_.value_at(other_);
   if (!(there - at_.value() < kMuchMore * (value - at_.value()))) return;
   candidate_ = other_;
   value = there;
 }
 
-void Search::go_on(ConstVectorView way) {
-  other_ = way;
+void Search::go_on(ConstVectorView ahead) {
+  other_ = ahead;
   for (int k = 0; k < kMostDoublings; ++k) {
     other_ *= 2;
-    if (at_.free_share(other_) < 1) return;
+    if (at_.free_fraction(other_) < 1) return;
     candidate_ = at_.x() + other_;
     const double value = at_.value_at(candidate_);
     if (!(value < at_.value())) return;

@@ -170,13 +170,13 @@ class CurvedDifference {
       for (const auto& at : quadrature<Dim>(kSquareDegree)) {
         const Vec<Dim> off = u.u * quadratic_shapes<Dim>(u.curved, place<Dim>(piece.in_a, at.weights)) -
                              w.u * quadratic_shapes<Dim>(w.curved, place<Dim>(piece.in_b, at.weights));
-        sum.square += at.share * piece.volume * off.squaredNorm();
+        sum.square += at.fraction * piece.volume * off.squaredNorm();
       }
       for (const auto& at : quadrature<Dim>(kGradientDegree)) {
         const Mat<Dim> off =
             u.u * quadratic_gradients<Dim, Dim>(u.curved, place<Dim>(piece.in_a, at.weights), of_a).transpose() -
             w.u * quadratic_gradients<Dim, Dim>(w.curved, place<Dim>(piece.in_b, at.weights), of_b).transpose();
-        sum.gradient_square += at.share * piece.volume * off.squaredNorm();
+        sum.gradient_square += at.fraction * piece.volume * off.squaredNorm();
       }
     }
   }
@@ -224,11 +224,11 @@ Integrals integrate_field(const Cells<Dim>& cells) {
     if (cells.is_curved(c)) {
       const CurvedField<Dim>& field = cells.curved[c];
       for (const auto& at : quadrature<Dim>(kSquareDegree))
-        sum.square += at.share * volume * (field.u * quadratic_shapes<Dim>(field.curved, at.weights)).squaredNorm();
+        sum.square += at.fraction * volume * (field.u * quadratic_shapes<Dim>(field.curved, at.weights)).squaredNorm();
       const auto gradients = cells.coordinate_gradients(c);
       for (const auto& at : quadrature<Dim>(kGradientDegree)) {
         const Mat<Dim> F = field.u * quadratic_gradients<Dim, Dim>(field.curved, at.weights, gradients).transpose();
-        sum.gradient_square += at.share * volume * F.squaredNorm();
+        sum.gradient_square += at.fraction * volume * F.squaredNorm();
       }
       sum.volume += volume;
       continue;
@@ -244,8 +244,8 @@ Integrals integrate_field(const Cells<Dim>& cells) {
 template <int Dim>
 using Facets = std::vector<std::array<Vec<Dim>, Dim>>;
 
-// Chords may leave curved edges by this share of the surface's extent (a distance is told to no better), and are at most so
-// many.
+// Chords may leave curved edges by this fraction of the surface's extent (a distance is told to no better), and are at most
+// so many.
 template <int Dim>
 constexpr double kChordError = Dim == 2 ? 1e-7 : 1e-4;
 template <int Dim>

@@ -18,8 +18,8 @@ struct FrameDistance {
   double reference_l2 = 0, reference_h1_semi = 0;  ///< of u_ref by itself
   /// Hausdorff distance of the bodies' present boundaries [m]: to a thousandth of itself or a millionth of their extent.
   double surface = 0;
-  /// Largest share of either's rest volume that the other does not cover: 0 to round-off for meshes of one shape. There the
-  /// integrals leave out what only one of them has.
+  /// Largest fraction of either's rest volume that the other does not cover: 0 to round-off for meshes of one shape. There
+  /// the integrals leave out what only one of them has.
   double uncovered = 0;
 };
 

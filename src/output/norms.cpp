@@ -41,7 +41,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
       for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(element.vertices[k]);
       const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) - X;
       const Mat<Dim> F = positions * shape_gradients<Dim>(element, point.weights).transpose();
-      add(point.share * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
+      add(point.fraction * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
     }
   }
   norms.l2 = std::sqrt(l2_squared);

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double kSameShape = 1e-6;  ///< share of the volume that two meshes of one shape may leave uncovered
+constexpr double kSameShape = 1e-6;  ///< fraction of the volume that two meshes of one shape may leave uncovered
 constexpr double kSameTime = 1e-9;   ///< relative
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 

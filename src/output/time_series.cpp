@@ -11,8 +11,8 @@ namespace itr::output {
 
 namespace {
 
-constexpr double kPeriod = 30;   // [s] between replacements of the file that are due to time
-constexpr double kShare = 1e-3;  // of the time, that these may take at most
+constexpr double kPeriod = 30;      // [s] between replacements of the file that are due to time
+constexpr double kFraction = 1e-3;  // of the time, that these may take at most
 
 std::string without_end(std::string text) {
   if (!text.empty() && text.back() == '\n') text.pop_back();
@@ -44,7 +44,7 @@ void SeriesText::append(std::string part) {
 
 void SeriesText::add(std::string part) {
   append(std::move(part));
-  const double pause = std::max(kPeriod, write_seconds_ / kShare);
+  const double pause = std::max(kPeriod, write_seconds_ / kFraction);
   if (count_ >= 2 * written_ || seconds_now() - last_write_ >= pause) write();
 }
 

@@ -61,12 +61,12 @@ ForgottenHistory forgotten_by_vertices(const TransferMesh<Dim>& old_patch, const
                                        const MatrixX& old_predictor, const MatrixX& new_predictor, const MatrixX& new_x) {
   ForgottenHistory forgotten{MatrixX::Zero(new_predictor.rows(), Dim), 0};
   const VectorX old_mass = lumped_masses(old_patch), new_mass = lumped_masses(new_patch);
-  const MatrixX way = new_x - new_predictor;
-  double squares = -new_mass.dot(way.rowwise().squaredNorm());
+  const MatrixX step = new_x - new_predictor;
+  double squares = -new_mass.dot(step.rowwise().squaredNorm());
   for (Eigen::Index j = 0; j < old_mass.size(); ++j) {
     const Place<Dim> place(new_patch, old_patch.rest[j]);
     const Vec<Dim> gap = place.value(new_predictor) - old_predictor.row(j).transpose();
-    squares += old_mass[j] * (gap.squaredNorm() + place.value(way).squaredNorm());
+    squares += old_mass[j] * (gap.squaredNorm() + place.value(step).squaredNorm());
     for (int k = 0; k <= Dim; ++k)
       forgotten.residual.row(place.vertices[k]) += place.weights[k] * old_mass[j] * gap.transpose();
   }

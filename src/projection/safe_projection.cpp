@@ -117,10 +117,10 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
     for (const int v : element.vertices)
       masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
   for (const auto& element : problem.cells.curved()) {
-    const auto shares = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
+    const auto fractions = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
     const auto nodes = element.nodes();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // 0 at straight edges
-      masses[nodes[k]] += problem.materials.at(element.body).density * element.volume * shares[k];
+      masses[nodes[k]] += problem.materials.at(element.body).density * element.volume * fractions[k];
   }
   std::vector<Integral> integrals(parts * Dim);
   for (int v = 0; v < patch; ++v)
@@ -160,10 +160,10 @@ struct Barriers {
   std::shared_ptr<ContactEnergy<Dim>> distance;  ///< null: nothing to touch
   double least_ratio;                            ///< of volumes, below which theirs acts
 
-  bool let_pass(const VectorX& x, const VectorX& way, Workspace& workspace) const {
-    const VectorX end = x + way;
-    return inversion->max_step(x, way, workspace) == 1 && volume->value(end, workspace) == 0 &&
-           (!distance || (distance->max_step(x, way, workspace) == 1 && distance->active(end, workspace).empty()));
+  bool let_pass(const VectorX& x, const VectorX& direction, Workspace& workspace) const {
+    const VectorX end = x + direction;
+    return inversion->max_step(x, direction, workspace) == 1 && volume->value(end, workspace) == 0 &&
+           (!distance || (distance->max_step(x, direction, workspace) == 1 && distance->active(end, workspace).empty()));
   }
 };
 
@@ -181,11 +181,11 @@ Barriers<Dim> barriers_for(const SafeProjectionProblem<Dim>& problem, const Vect
                          least_ratio / 2};
   barriers.volume = std::make_shared<VolumeBarrier<Dim>>(problem.cells, barriers.least_ratio, mass / volume * size * size);
   if (problem.surface) {
-    ContactOptions contact{.enabled = true, .activation_distance = problem.activation_distance};
+    ContactOptions contact{.enabled = true, .dhat = problem.dhat};
     const double nearest = ContactEnergy<Dim>(*problem.surface, contact, 1, 1).min_distance(interpolant, workspace);
-    contact.activation_distance = std::min(nearest, problem.activation_distance) / 2;
+    contact.dhat = std::min(nearest, problem.dhat) / 2;
     // At half of that distance the barrier is as stiff as the mass of a vertex.
-    const double stiffness = mass / problem.part.size() / std::pow(contact.activation_distance, 2);
+    const double stiffness = mass / problem.part.size() / std::pow(contact.dhat, 2);
     barriers.distance = std::make_shared<ContactEnergy<Dim>>(*problem.surface, contact, stiffness, 1);
   }
   return barriers;
@@ -195,18 +195,18 @@ Barriers<Dim> barriers_for(const SafeProjectionProblem<Dim>& problem, const Vect
 /// away.
 template <int Dim>
 std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const Barriers<Dim>& barriers, const VectorX& x,
-                                const VectorX& way, Workspace& workspace) {
+                                const VectorX& direction, Workspace& workspace) {
   std::vector<char> is_near(problem.cells.num_vertices, 0);
-  const VectorX end = x + way;
+  const VectorX end = x + direction;
   for (const auto& element : problem.cells.elements)
-    if (element.curved ? max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, way)) < 1
+    if (element.curved ? max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, direction)) < 1
                        : deformation_gradient<Dim>(element, end).determinant() < barriers.least_ratio)
       for_each_node(element, [&](int v) { is_near[v] = 1; });
   if (barriers.distance) {
-    VectorX single(way.size());
-    barriers.distance->get_single_ways(x, way, single, workspace);
+    VectorX single(direction.size());
+    barriers.distance->get_vertex_steps(x, direction, single, workspace);
     for (int v = 0; v < problem.cells.num_vertices; ++v)
-      is_near[v] |= single.segment<Dim>(Dim * v) != way.segment<Dim>(Dim * v);
+      is_near[v] |= single.segment<Dim>(Dim * v) != direction.segment<Dim>(Dim * v);
     for (const ContactStencil& pair : barriers.distance->active(end, workspace))
       for (int k = 0; k < pair.size(); ++k) is_near[pair.vertices[k]] = 1;
   }
@@ -224,13 +224,13 @@ std::vector<char> near_barriers(const SafeProjectionProblem<Dim>& problem, const
 /// Moves free dofs, all by the same, to where the integrals are; returns whether that is free of contact and inversion.
 bool close_integrals(const std::vector<Integral>& integrals, const VectorX& goal, const Energy& energy, VectorX& x,
                      Workspace& workspace) {
-  VectorX way = VectorX::Zero(x.size());
+  VectorX direction = VectorX::Zero(x.size());
   for (const Integral& integral : integrals) {
     const double shift = -integral.defect(x, goal) / integral.total_mass;
-    for (const int dof : integral.dofs) way[dof] = shift;
+    for (const int dof : integral.dofs) direction[dof] = shift;
   }
-  if (energy.max_step(x, way, workspace) < 1 || !std::isfinite(energy.value(x + way, workspace))) return false;
-  x += way;
+  if (energy.max_step(x, direction, workspace) < 1 || !std::isfinite(energy.value(x + direction, workspace))) return false;
+  x += direction;
   return true;
 }
 
@@ -240,15 +240,15 @@ template <int Dim>
 VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX& interpolant, const VectorX& projected,
                        linear::Solver& solver, SafeProjectionReport<Dim>& report) {
   Workspace workspace;
-  const VectorX way = projected - interpolant;
+  const VectorX direction = projected - interpolant;
   const Barriers<Dim> barriers = barriers_for(problem, interpolant, workspace);
-  if (barriers.let_pass(interpolant, way, workspace)) return projected;
+  if (barriers.let_pass(interpolant, direction, workspace)) return projected;
 
   // Far from what stands in the way all goes straight, if that is free with the rest left behind.
   VectorX x = interpolant;
   std::vector<char> held = problem.held_dofs;
-  const std::vector<char> is_near = near_barriers(problem, barriers, interpolant, way, workspace);
-  VectorX straight = way;
+  const std::vector<char> is_near = near_barriers(problem, barriers, interpolant, direction, workspace);
+  VectorX straight = direction;
   for (int v = 0; v < problem.cells.num_vertices; ++v)
     if (is_near[v]) straight.segment<Dim>(Dim * v).setZero();
   if (barriers.let_pass(interpolant, straight, workspace))
@@ -275,12 +275,12 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   options.max_iterations = 100;
   options.gradient_tolerance = options.first_gradient_tolerance = 0;
   // Integrals bind all vertices together, so that what stops one stops all: first without, near to the end.
-  options.step_tolerance = kNearEnd * way.norm();
+  options.step_tolerance = kNearEnd * direction.norm();
   options.decrement_tolerance = std::pow(kNearEnd, 2) * whole;
   report.iterations = minimize(energy, x, dofs, VectorX(), sparse, options, workspace).iterations;
   energy.add(std::make_shared<IntegralPenalty>(integrals, projected));
   PenalisedSystem system(sparse, integrals, dofs);
-  options.step_tolerance = kRelativeTolerance * way.norm();
+  options.step_tolerance = kRelativeTolerance * direction.norm();
   options.decrement_tolerance = std::pow(kHardlyNearer, 2) * whole;
   const NewtonSummary summary = minimize(energy, x, dofs, VectorX(), system, options, workspace);
   report.converged = summary.converged();

@@ -16,7 +16,7 @@ struct SafeProjectionProblem {
   const CellSet<Dim>& cells;        ///< the patch; other vertices of the surface after its own
   const CollisionSurface* surface;  ///< what can touch around the patch; null: nothing
   const std::map<int, Material>& materials;
-  double activation_distance;   ///< dhat: contact is looked at below it [m]
+  double dhat;                  ///< contact is looked at below it [m]
   std::vector<char> held_dofs;  ///< prescribed ones and those that do not belong to the patch, by dof
   std::vector<int> part;        ///< by vertex of the patch: its connected part; the integral of rho x is kept on each
   int rings;                    ///< so many edges around what stops the straight way vertices may leave it

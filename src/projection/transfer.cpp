@@ -71,7 +71,7 @@ void add_curved_difference(const TransferMesh<Dim>& old_mesh, int old_cell, cons
         in_old += point.weights[k] * piece.in_b[k];
       }
       const auto new_shapes = shapes_at<Dim>(new_curved, in_new), old_shapes = shapes_at<Dim>(old_curved, in_old);
-      const double weight = density * point.share * piece.volume;
+      const double weight = density * point.fraction * piece.volume;
       for (Eigen::Index column = 0; column < u_old.cols(); ++column) {
         const double gap = old_shapes.dot(values_in<Dim>(old_mesh, old_cell, u_old, column)) -
                            new_shapes.dot(values_in<Dim>(new_mesh, new_cell, u_bar, column));
@@ -160,9 +160,9 @@ class ConstrainedMass {
     polynomials_.resize(inverse_.rows(), Dim + 1);
     for (std::size_t v = 0; v < part_.size(); ++v) {
       const Box<Dim>& box = boxes[part_[v]];
-      const Vec<Dim> way = mesh.rest[v] - 0.5 * (box.min + box.max);
+      const Vec<Dim> motion = mesh.rest[v] - 0.5 * (box.min + box.max);
       const double size = (box.max - box.min).norm();
-      polynomials_.row(v) << 1, way.transpose() / (size > 0 ? size : 1);
+      polynomials_.row(v) << 1, motion.transpose() / (size > 0 ? size : 1);
     }
   }
 

@@ -80,14 +80,14 @@ CurvedCell<Dim> cell_before(const Mesh<Dim>& mesh, CellId c) {
   return {element.nodes(), element.curved};
 }
 
-/// Calls f(gradient, share of the volume) at the points of a rule that integrates squares of the gradient of a field on a
+/// Calls f(gradient, fraction of the volume) at the points of a rule that integrates squares of the gradient of a field on a
 /// cell.
 template <int Dim, typename F>
 void for_each_gradient(const typename CellSet<Dim>::Element& element, const VectorX& field, const F& f) {
   if (!element.curved) return f(deformation_gradient<Dim>(element, field), 1.0);
   const auto values = at_nodes<Dim>(element.nodes(), field);
   for (const auto& point : quadrature<Dim>(Dim))
-    f(Mat<Dim>(values * shape_gradients<Dim>(element, point.weights).transpose()), point.share);
+    f(Mat<Dim>(values * shape_gradients<Dim>(element, point.weights).transpose()), point.fraction);
 }
 
 /// Calls visit(f) for the boundary facets at a vertex, or at the edge of a node.
@@ -117,7 +117,7 @@ double mean_jacobian(const QuadraticCell<Dim>& x) {
   double mean = 0;
   for (const auto& point : quadrature<Dim>(Dim))
     mean +=
-        point.share * (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, point.weights, unit).transpose()).determinant();
+        point.fraction * (x * quadratic_gradients<Dim, Dim>(kAllCurved<Dim>, point.weights, unit).transpose()).determinant();
   return mean;
 }
 

@@ -33,12 +33,12 @@ Vec<Dim> rest_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, VertexId v) {
 }
 
 /// Least quality (simplex_quality of the rest shape: 1 regular, 0 flat) of a new cell, relative to the worst cell that it
-/// replaces: at least `share` of it, and where it is above `floor` not below `floor`. What is worse than `floor` may only
+/// replaces: at least `fraction` of it, and where it is above `floor` not below `floor`. What is worse than `floor` may only
 /// improve, so that no sequence of edits makes a mesh worse than `floor` or what it was.
 struct QualityRule {
-  double share = 0.3;
+  double fraction = 0.3;
   double floor = 0.1;
-  double least(double worst_before) const { return std::max(share * worst_before, std::min(floor, worst_before)); }
+  double least(double worst_before) const { return std::max(fraction * worst_before, std::min(floor, worst_before)); }
 };
 
 /// Splits an edge at its midpoint: every incident cell and boundary facet becomes two. Fields keep their values everywhere:

@@ -21,14 +21,14 @@ PlacedCell<Dim> place(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, co
                       const CurvedCell<Dim>& cell, const Edit<Dim>& edit) {
   PlacedCell<Dim> placed;
   placed.curved = cell.edges;
-  if (!terms.has_inertia) placed.way.setZero();
+  if (!terms.has_inertia) placed.step.setZero();
   const auto fill = [&](const auto& value_of, const auto& rest_of) {
     for (int k = 0; k < (cell.edges ? kQuadraticNodes<Dim> : Dim + 1); ++k) {
       if (!has_node<Dim>(cell.edges, k)) continue;
       const VertexId v = cell.nodes[k];
       if (k <= Dim) placed.rest[k] = rest_of(v);
       placed.x.col(k) = value_of(fields.x, v);
-      if (terms.has_inertia) placed.way.col(k) = placed.x.col(k) - value_of(fields.predictor, v);
+      if (terms.has_inertia) placed.step.col(k) = placed.x.col(k) - value_of(fields.predictor, v);
     }
   };
   if (&edit == &no_edit<Dim>())

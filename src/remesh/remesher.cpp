@@ -44,7 +44,7 @@ std::array<double, kOperationKinds> tolerances_of(const RemeshOptions& options) 
 /// Whether an edit makes no cell that is more compressed somewhere, now or in the past, than that fraction of what it
 /// replaces.
 template <int Dim>
-bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_share) {
+bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const Edit<Dim>& edit, double least_fraction) {
   constexpr double kTolerance = 0.1;
   const auto keeps = [&](const VectorX& x) {
     double before = std::numeric_limits<double>::infinity();
@@ -55,7 +55,7 @@ bool keeps_volumes(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const
       std::array<Vec<Dim>, Dim + 1> rest;
       for (int k = 0; k <= Dim; ++k) rest[k] = rest_after(mesh, edit, cell.vertices[k]);
       const auto nodes = cell_after(mesh, edit, cell.vertices).values(x, edit);
-      return min_jacobian_bound<Dim>(nodes, kTolerance) >= least_share * before * edge_matrix<Dim>(rest).determinant();
+      return min_jacobian_bound<Dim>(nodes, kTolerance) >= least_fraction * before * edge_matrix<Dim>(rest).determinant();
     });
   };
   return keeps(fields.x) && std::all_of(fields.past_positions.begin(), fields.past_positions.end(), keeps);

@@ -28,7 +28,7 @@ RemeshReport curve_edges(std::span<const EdgeKey> edges, Mesh<Dim>& mesh, Remesh
                          Strata<Dim>& strata);
 
 /// Replaces curved edges of these cells by their chords or makes them straight, whatever it costs, where that inverts and
-/// meets nothing; else as `remesh`. New cells keep `least_volume` everywhere, a share of the least mean volume ratio of
+/// meets nothing; else as `remesh`. New cells keep `least_volume` everywhere, a fraction of the least mean volume ratio of
 /// those that they replace, now and in the past.
 template <int Dim>
 RemeshReport straighten_cells(std::span<const CellId> cells, double least_volume, Mesh<Dim>& mesh, RemeshFields<Dim>& fields,

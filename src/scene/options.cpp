@@ -79,7 +79,7 @@ void read_acceptance(const Node& node, bool& enabled, std::optional<double>& tol
   if (node.has("acceptance_tolerance")) tolerance = node["acceptance_tolerance"].number(0);
 }
 
-double read_share(const Node& node, double fallback) {
+double read_fraction(const Node& node, double fallback) {
   const double value = node.number(fallback);
   if (!(value >= 0 && value <= 1)) node.fail("a number of [0, 1]");
   return value;
@@ -148,14 +148,14 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   ContactOptions options;
   options.enabled = contact["enabled"].boolean(false);
   const bool is_auto = contact.has("dhat") && contact["dhat"].json() == "auto";
-  options.activation_distance = is_auto ? 0 : contact["dhat"].positive(1e-3);
-  const double share = contact["dhat_percentage"].positive(0.8);
-  if (options.enabled && options.activation_distance > shortest_edge) {
+  options.dhat = is_auto ? 0 : contact["dhat"].positive(1e-3);
+  const double fraction = contact["dhat_percentage"].positive(0.8);
+  if (options.enabled && options.dhat > shortest_edge) {
     if (!contact.has("dhat"))
-      options.activation_distance = share * shortest_edge;
+      options.dhat = fraction * shortest_edge;
     else
       warnings.push_back(fmt::format("{}: {} is longer than the shortest edge of the surfaces, {}",
-                                     contact["dhat"].pointer(), units.text(options.activation_distance, "m", 6),
+                                     contact["dhat"].pointer(), units.text(options.dhat, "m", 6),
                                      units.text(shortest_edge, "m", 6)));
   }
   options.convergent = contact["use_convergent_formulation"].boolean(false);
@@ -309,7 +309,7 @@ RemeshOptions read_remesh(const Node& root) {
 
   const Node split = node["split"], collapse = node["collapse"], swap = node["swap"], smooth = node["smooth"];
   read_acceptance(split, options.split.enabled, options.split.acceptance_tolerance);
-  options.split.culling_threshold = read_share(split["culling_threshold"], options.split.culling_threshold);
+  options.split.culling_threshold = read_fraction(split["culling_threshold"], options.split.culling_threshold);
   options.split.max_depth = split["max_depth"].integer_at_least(0, options.split.max_depth);
   if (split.has("min_edge_length")) options.split.min_edge_length = split["min_edge_length"].non_negative(0);
 
@@ -319,7 +319,7 @@ RemeshOptions read_remesh(const Node& root) {
   read_acceptance(node["straighten"], options.straighten.enabled, options.straighten.acceptance_tolerance);
 
   read_acceptance(collapse, options.collapse.enabled, options.collapse.acceptance_tolerance);
-  options.collapse.culling_threshold = read_share(collapse["culling_threshold"], options.collapse.culling_threshold);
+  options.collapse.culling_threshold = read_fraction(collapse["culling_threshold"], options.collapse.culling_threshold);
   options.collapse.rel_max_edge_length = collapse["rel_max_edge_length"].non_negative(options.collapse.rel_max_edge_length);
 
   read_acceptance(swap, options.swap.enabled, options.swap.acceptance_tolerance);

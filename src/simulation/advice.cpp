@@ -349,7 +349,7 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
 /// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
 template <int Dim>
 void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::string>& found) {
-  constexpr double kShare = 0.01;
+  constexpr double kFraction = 0.01;
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
   double stiffness = 0;
@@ -357,7 +357,7 @@ void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::st
     stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
   const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
   const double split = *setup.remesh.split.acceptance_tolerance;
-  if (worth > kShare * split)
+  if (worth > kFraction * split)
     found.push_back(fmt::format(
         "Newton ends at steps of {}, which are worth about {}; a split is made for {}{}: refinement "
         "may see the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
@@ -370,7 +370,7 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
   const Setup<Dim>& setup = simulation.setup();
   if (!setup.contact.enabled) return;
   const State<Dim>& state = simulation.state();
-  const double dhat = setup.contact.activation_distance;
+  const double dhat = setup.contact.dhat;
   Workspace workspace;
   const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const ContactEnergy<Dim> energy(contact.surface, setup.contact, 1, 1);

@@ -55,7 +55,7 @@ class ChordBound {
       : setup_(setup), mesh_(mesh), levels_(levels), x_(x), chords_(chords), own_(static_cast<int>(chords_.facets.size())) {
     const int nodes = mesh.num_nodes();
     if (has_closed_faces(mesh, age))
-      closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.activation_distance, coincidence(mesh),
+      closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.dhat, coincidence(mesh),
                                   [&](int node) { return is_closed(mesh, node, age); });
     points_.reserve(chords_.points.size());
     for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));
@@ -171,8 +171,7 @@ class ChordBound {
   }
 
   double allowed(int i, int j) const {
-    const double gap = std::sqrt(simplex_distance_squared<Dim>(corners_[i], corners_[j])),
-                 dhat = setup_.contact.activation_distance;
+    const double gap = std::sqrt(simplex_distance_squared<Dim>(corners_[i], corners_[j])), dhat = setup_.contact.dhat;
     const double of_gap = heights_[j] > 0 ? kOfGap / 2 * gap : kOfGap * gap;
     return gap < dhat ? std::min(kOfActivation * dhat, of_gap) : of_gap;
   }
@@ -192,7 +191,7 @@ class ChordBound {
     const Vec<Dim> middle = at(node);
     const double chord =
         std::min({(middle - at(a)).norm(), (at(b) - middle).norm(), (mesh_.rest(a) - mesh_.rest(b)).norm() / 2});
-    const double halvings = std::floor(std::log2(chord / (kLeastChord * setup_.contact.activation_distance)));
+    const double halvings = std::floor(std::log2(chord / (kLeastChord * setup_.contact.dhat)));
     return static_cast<int>(std::clamp<double>(halvings, 0, kMostHalvings<Dim>));
   }
 

@@ -85,7 +85,7 @@ void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const Ve
   const bool has_closed = has_closed_faces(mesh);
   std::vector<char> stay(mesh.num_vertices(), 0);
   if (has_closed) {
-    const double dhat = setup.contact.activation_distance;
+    const double dhat = setup.contact.dhat;
     const auto visit = [&](PairKind kind, const std::array<int, 4>& vertices) {
       if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), x).data()) >= dhat * dhat) return;
       for (int k = 0; k < pair_size(kind); ++k) for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { stay[v] = 1; });

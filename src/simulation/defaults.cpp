@@ -33,9 +33,9 @@ constexpr double kSlipByMotion = 1e-3;  ///< of the speed that is prescribed: fr
 constexpr double kSlipByFall = 5e-7;
 constexpr double kLeastSplitEdge = 1e-6;  ///< of the bodies' diagonal at rest
 /// Cost that operations may have, in split tolerances. Collapses: with less, meshes stay fine where contact was.
-constexpr double kCollapseShare = 0.01;
+constexpr double kCollapseFraction = 0.01;
 /// Swaps and moves for the sake of the shape: hardly more than round-off, as they gain nothing else.
-constexpr double kShapeShare = 1e-6;
+constexpr double kShapeFraction = 1e-6;
 constexpr double kUsualStrain2 = 0.01;  ///< square of the strain at which bodies are expected to store energy
 
 /// Mean surface of a vertex on the boundary [m], [m^2].
@@ -83,7 +83,7 @@ template <int Dim>
 double barrier_stiffness_for(const Setup<Dim>& setup, const ContactOptions& contact, double modulus) {
   if (contact.convergent) return kSoftness * modulus;
   // A vertex's surface presses by 2 pairs of weight 1, not by its area over dhat^3.
-  return kSoftness * modulus * mean_vertex_area(setup.mesh) / (2 * std::pow(contact.activation_distance, 3));
+  return kSoftness * modulus * mean_vertex_area(setup.mesh) / (2 * std::pow(contact.dhat, 3));
 }
 
 template double barrier_stiffness_for(const Setup<2>&, const ContactOptions&, double);
@@ -106,7 +106,7 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
 /// The longest relative way that conditions and obstacles prescribe in the first steps, whatever the end of the run [m];
 /// infinity where they move nothing.
 template <int Dim>
-double prescribed_way(const Setup<Dim>& setup) {
+double prescribed_motion(const Setup<Dim>& setup) {
   double longest = 0;
   try {
     const VectorX first = held_dofs(setup, setup.mesh, setup.time.t0).target;
@@ -147,7 +147,7 @@ std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& co
 /// A thousandth of the thinnest body, a tenth of the shortest surface edge, a hundredth of what is prescribed without
 /// inertia, and less than the gap at the start.
 template <int Dim>
-std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& contact) {
+std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
   double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
   for (const auto& [body, size] : body_sizes(setup.mesh)) thinnest = std::min(thinnest, size.thickness);
   VectorX start = held_dofs(setup, setup.mesh, setup.time.t0).target;
@@ -158,9 +158,9 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
         shortest =
             std::min(shortest, (setup.mesh.rest(setup.mesh.facet(f)[i]) - setup.mesh.rest(setup.mesh.facet(f)[j])).norm());
   const Units& units = setup.units;
-  double& dhat = contact.activation_distance;
-  const double way = setup.time.has_inertia() ? std::numeric_limits<double>::infinity() : prescribed_way(setup);
-  dhat = std::min({kDhatByThickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * way});
+  double& dhat = contact.dhat;
+  const double motion = setup.time.has_inertia() ? std::numeric_limits<double>::infinity() : prescribed_motion(setup);
+  dhat = std::min({kDhatByThickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * motion});
   double gap = std::numeric_limits<double>::infinity();
   if (!setup.proxy) {
     Workspace workspace;
@@ -175,7 +175,7 @@ std::string choose_activation_distance(const Setup<Dim>& setup, ContactOptions& 
       "d-hat {}: a thousandth of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}; /contact/dhat sets "
       "another",
       units.text(dhat, "m"), units.text(thinnest, "m"), units.text(shortest, "m"),
-      std::isfinite(way) ? ", at most a hundredth of what is prescribed, " + units.text(way, "m") : "",
+      std::isfinite(motion) ? ", at most a hundredth of what is prescribed, " + units.text(motion, "m") : "",
       std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
 }
 
@@ -188,7 +188,7 @@ std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   const double available = available_energy(setup);
   if (available > 0) energy = std::min(energy, available);
   setup.follows_stored_energy.split = available == 0;
-  const double relative = available == 0 ? kStoredShare * remesh.relative_tolerance : remesh.relative_tolerance;
+  const double relative = available == 0 ? kStoredFraction * remesh.relative_tolerance : remesh.relative_tolerance;
   const double tolerance = relative * energy;
   remesh.split.acceptance_tolerance = tolerance;
   const Units& units = setup.units;
@@ -201,8 +201,8 @@ std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
                                    relative, units.text(energy, "J", 3));
   const std::string collapse = remesh.collapse.acceptance_tolerance
                                    ? units.text(-*remesh.collapse.acceptance_tolerance, "J", 2)
-                               : available == 0 ? fmt::format("{:g} of that", kCollapseShare)
-                                                : units.text(kCollapseShare * tolerance, "J", 2);
+                               : available == 0 ? fmt::format("{:g} of that", kCollapseFraction)
+                                                : units.text(kCollapseFraction * tolerance, "J", 2);
   return fmt::format(
       "{}; collapses may cost {}; /space/remesh/relative_tolerance and {{split,collapse}}/acceptance_tolerance set others",
       split, collapse);
@@ -211,13 +211,13 @@ std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
 /// Chooses the tolerances of operations beside splits from that of splits.
 void choose_other_tolerances(RemeshOptions& remesh, FollowsStoredEnergy& follows) {
   const double split = *remesh.split.acceptance_tolerance;
-  const auto choose = [&](std::optional<double>& tolerance, double share, bool& follows_too) {
+  const auto choose = [&](std::optional<double>& tolerance, double fraction, bool& follows_too) {
     follows_too = follows.split && !tolerance;
-    tolerance = tolerance.value_or(-share * split);
+    tolerance = tolerance.value_or(-fraction * split);
   };
-  choose(remesh.collapse.acceptance_tolerance, kCollapseShare, follows.collapse);
-  choose(remesh.swap.acceptance_tolerance, kShapeShare, follows.swap);
-  choose(remesh.smooth.acceptance_tolerance, kShapeShare, follows.smooth);
+  choose(remesh.collapse.acceptance_tolerance, kCollapseFraction, follows.collapse);
+  choose(remesh.swap.acceptance_tolerance, kShapeFraction, follows.swap);
+  choose(remesh.smooth.acceptance_tolerance, kShapeFraction, follows.smooth);
 }
 
 }  // namespace
@@ -228,7 +228,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
-  if (contact.enabled && contact.activation_distance == 0) words.push_back(choose_activation_distance(*this, contact));
+  if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
   if (contact.enabled && contact.friction_velocity == 0 && this->time.has_inertia()) {

@@ -56,18 +56,18 @@ class Diagnosis {
       : scope_(scope), x_(x), on_surface_(scope.surface.positions(x)), workspace_(workspace) {}
 
   void name_limit_of(const VectorX& step, std::string_view which = "the last") {
-    double share = 1;
-    const std::string limit = limit_of(step, share);
-    if (!limit.empty()) text_ << "; " << share << " of " << which << " Newton step is free, limited " << limit;
+    double fraction = 1;
+    const std::string limit = limit_of(step, fraction);
+    if (!limit.empty()) text_ << "; " << fraction << " of " << which << " Newton step is free, limited " << limit;
   }
   /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2)"; empty where the step is free.
-  std::string limit_of(const VectorX& step, double& share) {
+  std::string limit_of(const VectorX& step, double& fraction) {
     const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
     StepLimit pair;
     if (contact()) pair = contact()->step_limit(on_surface_, scope_.surface.motion(step), workspace_);
     const bool is_pair = pair.step < cell.step;
     const StepLimit& limit = is_pair ? pair : cell;
-    share = limit.step;
+    fraction = limit.step;
     if (limit.step >= 1) return {};
     return std::string("by the ") + std::string(limit.kind) + ' ' +
            (is_pair ? named_pair(kind_of_pair(limit), limit.vertices) : named_cell(limit.vertices));
@@ -189,9 +189,10 @@ std::string describe_effort(const SolveScope<Dim>& scope, const NewtonSummary& s
   std::ostringstream blocked, indefinite, text;
   blocked << summary.blocked << " went less than half of their step";
   if (summary.blocked_step.size() == summary.blocked_from.size() && summary.blocked_step.size() > 0) {
-    double share = 1;
-    const std::string limit = Diagnosis<Dim>(scope, summary.blocked_from, workspace).limit_of(summary.blocked_step, share);
-    if (!limit.empty()) blocked << ", the last " << share << " of it, stopped " << limit;
+    double fraction = 1;
+    const std::string limit =
+        Diagnosis<Dim>(scope, summary.blocked_from, workspace).limit_of(summary.blocked_step, fraction);
+    if (!limit.empty()) blocked << ", the last " << fraction << " of it, stopped " << limit;
   }
   indefinite << summary.indefinite << " met an indefinite Hessian";
   text << summary.iterations << " Newton iterations: "

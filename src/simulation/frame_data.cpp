@@ -17,12 +17,12 @@ namespace itr {
 
 namespace {
 
-/// Where output samples a cell: its mean has the weights `share`.
+/// Where output samples a cell: its mean has the weights `fraction`.
 template <int Dim>
 struct CellPoint {
   Mat<Dim> F;
   Vec<Dim> X;
-  double share;
+  double fraction;
 };
 
 /// f(element, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
@@ -38,7 +38,7 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
     if (element->curved)
       for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e++], degree))
         points.push_back({at_nodes<Dim>(element->nodes(), x) * shape_gradients<Dim>(*element, point.weights).transpose(),
-                          rest_position<Dim>(cells, *element, point.weights), point.share});
+                          rest_position<Dim>(cells, *element, point.weights), point.fraction});
     else
       points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), 1});
     f(*element, std::span<const CellPoint<Dim>>(points));
@@ -85,10 +85,10 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
     const Material& material = setup.materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
-    for (const auto& [F, X, share] : points) {
+    for (const auto& [F, X, fraction] : points) {
       const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
-      cauchy += share * here;
-      equivalent += share * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+      cauchy += fraction * here;
+      equivalent += fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
     }
     stress.von_mises.push_back(equivalent);
     for (int i = 0; i < Dim; ++i)
@@ -147,7 +147,7 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   const auto add_density = [&](const auto& element, auto points) {
     const Material& material = setup.materials.at(element.body);
     double mean = 0;
-    for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    for (const auto& [F, X, fraction] : points) mean += fraction * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
     if (element.curved)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
                                    elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));

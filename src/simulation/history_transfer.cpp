@@ -100,7 +100,7 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.activation_distance, age);
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.dhat, age);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)
@@ -111,10 +111,9 @@ class HistoryTransfer {
     }
     SafeProjectionReport<Dim> safe;
     const auto& patch = patch_.new_cells;
-    VectorX x =
-        project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
-                             setup_.contact.activation_distance, std::move(held), parts_of(patch.view()), kRings<Dim>},
-                            interpolant, goal, solver, safe);
+    VectorX x = project_safely<Dim>({cells, surface.empty() ? nullptr : &surface.surface, setup_.materials,
+                                     setup_.contact.dhat, std::move(held), parts_of(patch.view()), kRings<Dim>},
+                                    interpolant, goal, solver, safe);
     report.with_barriers += safe.used_barriers;
     report.not_converged += !safe.converged;
     lost += safe.lost;

@@ -38,8 +38,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   if (!has_closed_faces(state.mesh)) {
     for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
-             overlap.depth > setup.contact.activation_distance) {
+  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords); overlap.depth > setup.contact.dhat) {
     refuse("a body", overlap.place);
   }
   for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)

@@ -133,11 +133,12 @@ class LaggedSolve {
   /// Solves as StepProblem::solve says.
   NewtonSummary solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
     double lagging_seconds = 0;
-    VectorX way_to_start;
+    VectorX step_to_start;
     {
       const ScopedTimer timer(lagging_seconds);
       const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
-      if (potential_.contact()) potential_.contact()->foresee(surface_.positions(x), surface_.motion(start - x), workspace_);
+      if (potential_.contact())
+        potential_.contact()->predict_motion(surface_.positions(x), surface_.motion(start - x), workspace_);
       const bool is_first_step = std::isinf(stiffness_.largest);
       if (adaptive_ && !is_first_step)
         problem_.initialize_stiffness(x);  // what the friction of the first round is lagged with
@@ -147,11 +148,11 @@ class LaggedSolve {
       // PolyFEM begins where the step does: so it is in the regression values of peers' scenes.
       const bool may_move = !adaptive_ && setup_.newton.indefinite == IndefiniteHessian::project;
       if (expected.size() > 0 && may_move && is_better_start(start, x)) {
-        if (terms_.has_inertia) way_to_start = start - x;
+        if (terms_.has_inertia) step_to_start = start - x;
         x = start;
       }
     }
-    NewtonSummary summary = minimize_first(x, std::move(way_to_start));
+    NewtonSummary summary = minimize_first(x, std::move(step_to_start));
     problem_.rounds_ = 1;
     summary.assembly_seconds += lagging_seconds;
     const int rounds = most_rounds();
@@ -223,7 +224,7 @@ class LaggedSolve {
   /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will
   /// hold them, and slide off before the next round unless friction is lagged where contact forces are new: here it is
   /// lagged again as often as those on a body double or halve on the way, and at the end where friction itself would.
-  NewtonSummary minimize_first(VectorX& x, VectorX way_to_start) {
+  NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
     constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
     constexpr double kChange = 2;
     NewtonSummary all;
@@ -239,7 +240,7 @@ class LaggedSolve {
           const std::vector<double> now = contact_forces_on_loose_parts(iterate);
           return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
         };
-      NewtonSummary summary = minimize_lagged(x, std::exchange(way_to_start, {}), ends_at);
+      NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}), ends_at);
       summary.add_effort(all);
       all = std::move(summary);
       if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
@@ -273,17 +274,17 @@ class LaggedSolve {
   }
   /// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms
   /// before held dofs move: so it is in the regression values of peers' scenes.
-  NewtonSummary minimize_lagged(VectorX& x, VectorX way_to_start = {},
+  NewtonSummary minimize_lagged(VectorX& x, VectorX step_to_start = {},
                                 const std::function<bool(const VectorX& x)>& ends_at = {}) {
     const EnergySum sum = potential_.sum(lagged_);
     if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
     NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
                         .on_iteration = setup_.on_iteration,
                         .must_be_minimum = !terms_.has_inertia};
-    if (way_to_start.size() > 0) {
-      extras.gradient_of_way = VectorX::Zero(x.size());
-      potential_.inertia()->add_mass_product(way_to_start, extras.gradient_of_way);
-      extras.way_to_start = std::move(way_to_start);
+    if (step_to_start.size() > 0) {
+      extras.gradient_of_step = VectorX::Zero(x.size());
+      potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
+      extras.step_to_start = std::move(step_to_start);
     }
     if (cells_.has_curved()) {
       potential_.elastic()->refine_quadrature(x);
@@ -426,8 +427,8 @@ class LaggedSolve {
       if (dofs_.unknown[i] == kNone) gradient[i] = 0;
     return gradient;
   }
-  /// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
-  /// their forces on unknowns at x.
+  /// By which fraction of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`,
+  /// in their forces on unknowns at x.
   template <typename F>
   double change_of(const VectorX& x, const Lagged& now, const F& is_asked) {
     const VectorX after = forces_of(x, now, is_asked), before = forces_of(x, lagged_, is_asked);

@@ -34,9 +34,9 @@ std::vector<FacetId> facets_of_moving(const Mesh<Dim>& mesh, std::span<const int
 
 /// Boxes that hold facets on their way from `x` to `goal`, which is by the numbers that `known` has.
 template <int Dim>
-std::vector<Box<Dim>> boxes_of_ways(const Mesh<Dim>& mesh, const std::vector<FacetId>& facets,
-                                    const std::unordered_map<int, int>& known, const VectorX& x, const VectorX& goal,
-                                    double reach) {
+std::vector<Box<Dim>> swept_boxes(const Mesh<Dim>& mesh, const std::vector<FacetId>& facets,
+                                  const std::unordered_map<int, int>& known, const VectorX& x, const VectorX& goal,
+                                  double reach) {
   std::vector<Box<Dim>> boxes;
   std::vector<typename MeshTypes<Dim>::Facet> chords;
   for (const FacetId f : facets) {
@@ -66,7 +66,7 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obs
 
   std::unordered_map<int, int> known;  // from ids in fields to those in the patch
   for (std::size_t i = 0; i < vertices.size(); ++i) known[vertices[i]] = static_cast<int>(i);
-  const Bvh<Dim> tree(boxes_of_ways<Dim>(mesh, own, known, x, goal, reach));
+  const Bvh<Dim> tree(swept_boxes<Dim>(mesh, own, known, x, goal, reach));
   std::vector<int> hits;
   const auto is_near = [&](std::span<const int> ids) {
     Box<Dim> box;

@@ -76,7 +76,7 @@ std::vector<MomentumChange> momentum_changes(const StepSetup<Dim>& setup, const 
   return changes;
 }
 
-/// Share of the mass times the size of the bodies that round-off explains: less is not told.
+/// Fraction of the mass times the size of the bodies that round-off explains: less is not told.
 constexpr double kLossWorthTelling = 1e-12;
 
 /// The bodies' part of a field over bodies and obstacles.
@@ -198,10 +198,10 @@ RemeshOptions options_of_step(const StepSetup<Dim>& setup, double stored_energy)
   const FollowsStoredEnergy& follows = setup.follows_stored_energy;
   if (!follows.split) return options;
   const double split = *options.split.acceptance_tolerance;
-  const double share = std::clamp(kStoredShare * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
-  options.split.acceptance_tolerance = share * split;
-  const auto scale = [share](std::optional<double>& tolerance, bool follows_too) {
-    if (follows_too) tolerance = share * *tolerance;
+  const double fraction = std::clamp(kStoredFraction * options.relative_tolerance * stored_energy / split, kLeast, 1.0);
+  options.split.acceptance_tolerance = fraction * split;
+  const auto scale = [fraction](std::optional<double>& tolerance, bool follows_too) {
+    if (follows_too) tolerance = fraction * *tolerance;
   };
   scale(options.collapse.acceptance_tolerance, follows.collapse);
   scale(options.swap.acceptance_tolerance, follows.swap);

@@ -6,9 +6,9 @@
 
 namespace itr {
 
-/// Share of RemeshOptions::relative_tolerance where the split tolerance follows the energy that is stored so far: that is
+/// Fraction of RemeshOptions::relative_tolerance where the split tolerance follows the energy that is stored so far: that is
 /// less than the energy that bodies can hold, of which the other tolerance is a part.
-inline constexpr double kStoredShare = 0.1;
+inline constexpr double kStoredFraction = 0.1;
 
 /// Remeshes state.mesh, around the solution x of `problem`, and carries state.history and x over to the new mesh; `before`
 /// is the state as it is, at the end of the step but for x. Returns what became of its ids; nothing where nothing changed.

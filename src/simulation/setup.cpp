@@ -45,7 +45,7 @@ void check_time(const TimeOptions& time) {
 
 void check_contact(const ContactOptions& contact) {
   if (!contact.enabled) return;
-  require_not_negative("/contact/dhat", contact.activation_distance);
+  require_not_negative("/contact/dhat", contact.dhat);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
   require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
   require_not_negative("/contact/epsv", contact.friction_velocity);
@@ -66,7 +66,7 @@ void check_newton(const NewtonOptions& newton) {
 
 void check_remeshing(const RemeshOptions& remesh) {
   if (!remesh.enabled) return;
-  const auto share = [](const char* place, double value) {
+  const auto fraction = [](const char* place, double value) {
     require(value >= 0 && value <= 1, place, value, "a number of [0, 1]");
   };
   require_positive("/space/remesh/relative_tolerance", remesh.relative_tolerance);
@@ -78,8 +78,8 @@ void check_remeshing(const RemeshOptions& remesh) {
   require(true, "/space/remesh/collapse/acceptance_tolerance", remesh.collapse.acceptance_tolerance.value_or(0), "a number");
   require(true, "/space/remesh/swap/acceptance_tolerance", remesh.swap.acceptance_tolerance.value_or(0), "a number");
   require(true, "/space/remesh/smooth/acceptance_tolerance", remesh.smooth.acceptance_tolerance.value_or(0), "a number");
-  share("/space/remesh/split/culling_threshold", remesh.split.culling_threshold);
-  share("/space/remesh/collapse/culling_threshold", remesh.collapse.culling_threshold);
+  fraction("/space/remesh/split/culling_threshold", remesh.split.culling_threshold);
+  fraction("/space/remesh/collapse/culling_threshold", remesh.collapse.culling_threshold);
   require_at_least("/space/remesh/split/max_depth", remesh.split.max_depth, 0);
   require_at_least("remesh.local.rings", remesh.local.rings, 0);
   require_at_least("remesh.local.max_iterations", remesh.local.max_iterations, 1);

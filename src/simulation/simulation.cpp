@@ -25,11 +25,11 @@ namespace itr {
 
 namespace {
 
-constexpr double kMostRotation = 5;     ///< of linear elasticity [degrees]: strains are off by 4e-3 there
-constexpr double kForceError = 0.01;    ///< relative, from which it is said
-constexpr int kLooseSteps = 3;          ///< in a row
-constexpr double kNoStrain = 1e-6;      ///< below it the energy of bodies is taken for none
-constexpr double kResidualShare = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
+constexpr double kMostRotation = 5;        ///< of linear elasticity [degrees]: strains are off by 4e-3 there
+constexpr double kForceError = 0.01;       ///< relative, from which it is said
+constexpr int kLooseSteps = 3;             ///< in a row
+constexpr double kNoStrain = 1e-6;         ///< below it the energy of bodies is taken for none
+constexpr double kResidualFraction = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
 
 /// Energy of the bodies by the square of a strain that is everywhere, sum(E V) [J].
 template <int Dim>
@@ -74,7 +74,7 @@ class Watch {
   }
   void find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger) {
     if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled) return;
-    if (!(report.residual_worth > kResidualShare * report.split_tolerance)) return;
+    if (!(report.residual_worth > kResidualFraction * report.split_tolerance)) return;
     has_said_remeshing_ = true;
     logger.warning(fmt::format(
         "step {}: Newton ended where one more iteration would gain {}, and a split is made for {}: "
@@ -530,7 +530,7 @@ void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
                        data.elastic_density,      data.obstacle_x, setup.obstacles.edges,
                        setup.obstacles.triangles, &data.asked};
   frame.names = &setup.names;
-  frame.dhat = setup.contact.activation_distance;
+  frame.dhat = setup.contact.dhat;
   if (setup.proxy) frame.proxy = {&data.proxy_x, &setup.proxy->edges, &setup.proxy->triangles};
   observer(frame);
 }

@@ -92,11 +92,11 @@ std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
     if (slender.contains(inside.body)) continue;
     const double length = std::min(kSlender * sizes.at(inside.body).diagonal, kLayers * edge_length(mesh, f));
     const Vec<Dim> p = inside.center + kStart * length * inside.inward, q = inside.center + length * inside.inward;
-    Box<Dim> way;
-    way.include(p);
-    way.include(q);
+    Box<Dim> direction;
+    direction.include(p);
+    direction.include(q);
     hits.clear();
-    tree.query(way, hits);
+    tree.query(direction, hits);
     if (std::any_of(hits.begin(), hits.end(), [&](FacetId other) { return other != f && meets(mesh, other, p, q); }))
       slender.insert(inside.body);
   }
@@ -148,18 +148,18 @@ std::vector<EdgeKey> find_edges_that_lock(const StepTools<Dim>& tools, const Sta
   }
   const linear::FactorRecord record = tools.solver.record();
   ProblemCache<Dim> cache(tools.solver);
-  VectorX way;
+  VectorX direction;
   {
     StepProblem<Dim> problem(tools.setup, curved, history, state.t, cache, state.stiffness, {}, chords);
-    way = problem.find_instability(on_curved(mesh, curved, x));
+    direction = problem.find_instability(on_curved(mesh, curved, x));
   }
   tools.solver.restore(record);
   ++tools.cache.served;  // the solver has analysed another system since
-  if (way.size() == 0) return {};
+  if (direction.size() == 0) return {};
   std::vector<double> parts;
   for (const EdgeKey& edge : edges) {
     const auto [a, b] = edge;
-    const auto at = [&](int node) { return way.segment<Dim>(Dim * node); };
+    const auto at = [&](int node) { return direction.segment<Dim>(Dim * node); };
     const bool is_straight = mesh.node_of(edge) == kNone;
     parts.push_back(is_straight ? (at(curved.node_of(edge)) - (at(a) + at(b)) / 2).norm() : 0);
   }

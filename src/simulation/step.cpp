@@ -49,7 +49,7 @@ class EnergyGuard {
     const double before = problem.mechanical_energy(history.x[0], history.v[0]);
     // With the work that was done on the bodies, without what the step created.
     const double after = std::max(0.0, problem.mechanical_energy(x, integrator.velocity(x, history)) - created);
-    // Energy that is dissipated or flows off takes along its share of what was created before.
+    // Energy that is dissipated or flows off takes along its fraction of what was created before.
     balance_ = created + start_ * (before > 0 ? std::min(1.0, after / before) : 1);
     if (!is_trapezoidal) {
       balance_ = std::max(0.0, balance_);  // what implicit Euler dissipates is no credit for later steps

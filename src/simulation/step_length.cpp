@@ -61,7 +61,7 @@ std::vector<Prescribed> all_prescribed(const Setup<Dim>& setup, const Vec<Dim>& 
 /// How far values go beyond the straight way from one end of a step to the other, in the worst of some steps, by their range
 /// over all of these.
 struct Detour {
-  double share = 0, t = 0;
+  double fraction = 0, t = 0;
 };
 
 Detour find_detour(const Prescribed& prescribed, const TimeOptions& time) {
@@ -74,21 +74,21 @@ Detour find_detour(const Prescribed& prescribed, const TimeOptions& time) {
     const double begin = time.t0 + time.dt * std::floor(static_cast<double>(k) * time.steps / steps);
     const VectorX start = prescribed.value(begin);
     VectorX last = start;
-    double way = 0;
+    double path = 0;
     for (int i = 1; i <= kSamples; ++i) {
       VectorX value = prescribed.value(begin + time.dt * i / kSamples);
       low = low.cwiseMin(value);
       high = high.cwiseMax(value);
-      way += (value - last).norm();
+      path += (value - last).norm();
       last = std::move(value);
     }
-    if (const double detour = way - (last - start).norm(); detour > longest) {
+    if (const double detour = path - (last - start).norm(); detour > longest) {
       longest = detour;
       worst.t = begin;
     }
   }
   const double range = (high - low).norm();
-  if (range > 0 && std::isfinite(range)) worst.share = longest / range;
+  if (range > 0 && std::isfinite(range)) worst.fraction = longest / range;
   return worst;
 }
 
@@ -115,9 +115,9 @@ double prescribed_speed(const Setup<Dim>& setup, const Vec<Dim>& center, int ste
   VectorX before = held_dofs(setup, setup.mesh, time.t0).target;
   for (int i = 1; i <= kSamples; ++i) {
     const VectorX after = held_dofs(setup, setup.mesh, time.t0 + time.dt * steps * i / kSamples).target;
-    const VectorX way = after - before;
-    for (Eigen::Index k = 0; k + Dim <= way.size(); k += Dim)
-      speed = std::max(speed, way.template segment<Dim>(k).norm() * kSamples / (time.dt * steps));
+    const VectorX path = after - before;
+    for (Eigen::Index k = 0; k + Dim <= path.size(); k += Dim)
+      speed = std::max(speed, path.template segment<Dim>(k).norm() * kSamples / (time.dt * steps));
     before = after;
   }
   return speed;
@@ -145,7 +145,7 @@ void find_long_steps(const Setup<Dim>& setup, double size, const Vec<Dim>& cente
     } catch (const InputError&) {  // no value at a time that no step ends at
       continue;
     }
-    if (detour.share > kDetour)
+    if (detour.fraction > kDetour)
       found.push_back(
           fmt::format("{} is too long for {}: within a step, from t = {} on, it goes to and fro, and only its "
                       "values at the ends of steps count",

@@ -135,10 +135,10 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
 /// stick then creep by as much of the whole path, in any number of steps and in any unit of time.
 template <int Dim>
 void StepProblem<Dim>::smooth_friction_by(double motion) {
-  constexpr double kShare = 1e-3;
+  constexpr double kFraction = 1e-3;
   constexpr double kLeast = 1e-6;  // of the bodies' diagonal: less is no motion
   if (setup_.contact.friction_velocity == 0)
-    terms_.contact.friction_velocity = kShare * std::max(motion, kLeast * scope_->diagonal) * terms_.velocity_rate;
+    terms_.contact.friction_velocity = kFraction * std::max(motion, kLeast * scope_->diagonal) * terms_.velocity_rate;
 }
 
 template <int Dim>

@@ -44,7 +44,7 @@ struct Step {
     context.newton.step_tolerance = 1e-9;
     if (!has_contact) return context;
     const double dhat = 0.1 / n;
-    context.contact = {.enabled = true, .activation_distance = dhat, .convergent = true, .barrier_stiffness = 1e4};
+    context.contact = {.enabled = true, .dhat = dhat, .convergent = true, .barrier_stiffness = 1e4};
     auto& obstacles = context.obstacles;
     if constexpr (Dim == 2) {
       obstacles.rest = {{-9, -dhat}, {9, -dhat}};

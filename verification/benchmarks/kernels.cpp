@@ -68,7 +68,7 @@ struct Cube {
 struct Sheets {
   CollisionSurface surface;
   VectorX x;
-  ContactOptions options{.enabled = true, .activation_distance = 0.02, .convergent = true};
+  ContactOptions options{.enabled = true, .dhat = 0.02, .convergent = true};
   explicit Sheets(int n) {
     std::mt19937 random(2);
     std::uniform_real_distribution<double> noise(-0.002, 0.002);
@@ -180,7 +180,7 @@ void BroadPhase(benchmark::State& state) {
   const VectorX still = VectorX::Zero(sheets.x.size());
   for (auto _ : state) {
     Workspace workspace;
-    contact.foresee(sheets.x, still, workspace);
+    contact.predict_motion(sheets.x, still, workspace);
   }
   state.SetItemsProcessed(state.iterations() *
                           static_cast<long>(sheets.surface.vertices.size() + sheets.surface.edges.size()));

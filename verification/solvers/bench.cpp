@@ -4,7 +4,7 @@
 // Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
 // alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that
 // follow each other, less one), fill, bytes, achieved residual. --once: one factorisation and no bare engine. --analyze: the
-// analysis alone, and the fill, bytes and flops that it foresees. --after: the analysis may keep the order of that of
+// analysis alone, and the fill, bytes and flops that it predicts. --after: the analysis may keep the order of that of
 // another system, which comes first.
 #include <dlfcn.h>
 #include <fmt/format.h>

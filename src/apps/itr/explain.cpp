@@ -227,7 +227,7 @@ class Explanation {
     if (setup_.proxy) fmt::print("  a collision mesh touches in place of the bodies' boundary\n");
     fmt::print("  {} surface vertices, {} edges", surface.vertices.size(), surface.edges.size());
     if (Dim == 3) fmt::print(", {} triangles", surface.triangles.size());
-    const double dhat = setup_.contact.activation_distance;
+    const double dhat = setup_.contact.dhat;
     Workspace workspace;
     const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
     fmt::print("; d-hat {}, {} pairs nearer than that at the start\n", setup_.units.text(dhat, "m"),
@@ -266,13 +266,13 @@ template <int Dim>
 Json chosen_settings(Setup<Dim> setup, const Json& scene) {
   const std::string stiffness = "/solver/contact/barrier_stiffness";
   const bool is_open = setup.contact.enabled && !scene.contains(Json::json_pointer(stiffness));
-  const bool has_open_dhat = setup.contact.enabled && setup.contact.activation_distance == 0;
+  const bool has_open_dhat = setup.contact.enabled && setup.contact.dhat == 0;
   if (is_open) setup.contact.adaptive_stiffness = false, setup.contact.barrier_stiffness = 0;
   setup.remesh.enabled = true;
   setup.choose_defaults();
   Json settings = Json::object();
   if (is_open) settings[stiffness] = setup.contact.barrier_stiffness / barrier_unit(setup.units, setup.contact);
-  if (has_open_dhat) settings["/contact/dhat"] = setup.units.from_si(setup.contact.activation_distance, "m");
+  if (has_open_dhat) settings["/contact/dhat"] = setup.units.from_si(setup.contact.dhat, "m");
   const auto add = [&](const char* operation, const std::optional<double>& tolerance) {
     if (tolerance)
       settings[fmt::format("/space/remesh/{}/acceptance_tolerance", operation)] = setup.units.from_si(*tolerance, "J");

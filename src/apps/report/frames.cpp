@@ -13,9 +13,9 @@ namespace itr::report {
 
 namespace {
 
-constexpr double kGapShare = 0.02;    // of the bodies' diagonal: gaps beyond are not told apart
-constexpr double kNothing = 1e-9;     // times the largest value: is shown as zero, as its digits are round-off
-constexpr double kShownShare = 0.98;  // of the values of a frame that have colours of their own
+constexpr double kGapFraction = 0.02;    // of the bodies' diagonal: gaps beyond are not told apart
+constexpr double kNothing = 1e-9;        // times the largest value: is shown as zero, as its digits are round-off
+constexpr double kShownFraction = 0.98;  // of the values of a frame that have colours of their own
 
 enum Kind { vertex_kind, node_kind, obstacle_kind };
 
@@ -157,7 +157,7 @@ void FrameEncoder::start(const StoredFrame& frame, const std::vector<StoredField
 void FrameEncoder::add(const std::filesystem::path& path) {
   const StoredFrame frame = output::read_frame(path);
   std::vector<StoredField> fields = output::read_frame_fields(path);
-  if (frames_.empty()) gap_limit_ = kGapShare * diagonal(frame);
+  if (frames_.empty()) gap_limit_ = kGapFraction * diagonal(frame);
   if (std::vector<double> values = gaps(frame, gap_limit_); !values.empty())
     fields.push_back({"gap", "m", 1, std::move(values)});
   if (frames_.empty()) start(frame, fields);
@@ -319,7 +319,7 @@ void FrameEncoder::add_values(std::size_t field, std::vector<double> values, std
   append_planar(bytes, codes);
   std::erase(values, 0.0);  // forces and stresses are zero at most places
   if (values.empty()) return;
-  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kShownShare * static_cast<double>(values.size()))) - 1;
+  const auto rank = static_cast<std::ptrdiff_t>(std::ceil(kShownFraction * static_cast<double>(values.size()))) - 1;
   std::nth_element(values.begin(), values.begin() + rank, values.end());
   shown_[field] = std::max(shown_[field], values[rank]);
 }

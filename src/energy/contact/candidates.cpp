@@ -18,8 +18,8 @@ constexpr std::size_t kFewStrays = 8;     ///< a part of the vertices from which
 constexpr std::size_t kFewPairs = 16384;  ///< so many are looked at one by one: cheaper than a tree
 constexpr std::size_t kMostPairs = 1 << 20, kMostPairsAnEdge = 64;  ///< a sum: see most_pairs()
 constexpr std::size_t kMostOfRest = 4;                              ///< times the pairs at rest, where these are many
-/// Room around a motion, as a share of the longest: where steps of a solve lead, and where a solve is expected to go.
-constexpr double kUnforeseen = 0.25, kForeseen = 0.02;
+/// Room around a motion, as a fraction of the longest: where steps of a solve lead, and where a solve is expected to go.
+constexpr double kUnpredicted = 0.25, kPredicted = 0.02;
 
 template <int Dim>
 Vec<Dim> at(ConstVectorView x, int v) {
@@ -196,11 +196,11 @@ void replace(std::vector<std::array<int, 2>>& pairs, std::vector<std::array<int,
 
 template <int Dim>
 double ContactCandidates<Dim>::room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach,
-                                        double share) {
+                                        double fraction) {
   double motion = 0;
   if (dx)
     for (const int v : surface.vertices) motion = std::max(motion, at<Dim>(*dx, v).norm());
-  return 0.5 * reach + share * motion;
+  return 0.5 * reach + fraction * motion;
 }
 
 /// Room around the motion of one vertex: that of all, or less where it hardly moves and another search would be small.
@@ -245,44 +245,44 @@ std::size_t ContactCandidates<Dim>::most_now(const CollisionSurface& surface) co
 
 template <int Dim>
 double ContactCandidates<Dim>::update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
-                                      KeptVector& part, double longest) {
+                                      ScratchVector& part, double longest) {
   const ScopedPhase phase("candidates");
   if (longest == 1 && hold(surface, x, &dx, reach, most_now(surface))) return 1;
   return search_part(surface, x, dx, reach, part, std::min(longest, 0.5));
 }
 
 template <int Dim>
-void ContactCandidates<Dim>::foresee(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
-                                     KeptVector& part) {
+void ContactCandidates<Dim>::predict_motion(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx,
+                                            double reach, ScratchVector& part) {
   at_rest_ = 0;
-  if (!search(surface, x, &dx, reach, kForeseen, most_now(surface))) search_part(surface, x, dx, reach, part, 0.5);
+  if (!search(surface, x, &dx, reach, kPredicted, most_now(surface))) search_part(surface, x, dx, reach, part, 0.5);
 }
 
-/// Finds the pairs of the longest of dx, dx / 2, dx / 4, ..., not longer than this share of it, that has few enough of them;
-/// returns its share. Motions beyond the extent of all bodies need not be tried. Below `reach`, pairs are those of bodies at
-/// rest, of which none can be left out.
+/// Finds the pairs of the longest of dx, dx / 2, dx / 4, ..., not longer than this fraction of it, that has few enough of
+/// them; returns its share. Motions beyond the extent of all bodies need not be tried. Below `reach`, pairs are those of
+/// bodies at rest, of which none can be left out.
 template <int Dim>
 double ContactCandidates<Dim>::search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx,
-                                           double reach, KeptVector& part, double share) {
+                                           double reach, ScratchVector& part, double fraction) {
   Box<Dim> around;
   for (const int v : surface.vertices) around.include(at<Dim>(x, v));
   const double longest = dx.lpNorm<Eigen::Infinity>(), extent = (around.max - around.min).maxCoeff();
-  while (share * longest > extent + reach) share /= 2;
-  for (;; share /= 2) {
-    const ConstVectorView way = part.resize(dx.size()) = share * dx;
-    const std::size_t most = way.lpNorm<Eigen::Infinity>() > reach ? most_now(surface) : kNoLimit;
-    if (search(surface, x, &way, reach, kForeseen, most)) return share;
+  while (fraction * longest > extent + reach) fraction /= 2;
+  for (;; fraction /= 2) {
+    const ConstVectorView step = part.resize(dx.size()) = fraction * dx;
+    const std::size_t most = step.lpNorm<Eigen::Infinity>() > reach ? most_now(surface) : kNoLimit;
+    if (search(surface, x, &step, reach, kPredicted, most)) return fraction;
   }
 }
 
 template <int Dim>
 bool ContactCandidates<Dim>::hold(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
                                   double reach, std::size_t most) {
-  const auto search_all = [&] { return search(surface, x, dx, reach, kUnforeseen, most); };
+  const auto search_all = [&] { return search(surface, x, dx, reach, kUnpredicted, most); };
   const bool is_known = holds_ && surface_ == &surface && revision_ == surface.revision &&
                         boxes_.size() == surface.vertices.size() && searched_ == reach;
   if (!is_known) return search_all();
-  const double room = room_for(surface, dx, reach, kUnforeseen);
+  const double room = room_for(surface, dx, reach, kUnpredicted);
   find_strays(surface, x, dx, reach, room);
   if (strays_.empty()) return true;
   if (!has_trees_ || kFewStrays * strays_.size() > boxes_.size()) return search_all();
@@ -345,13 +345,13 @@ bool ContactCandidates<Dim>::replace_pairs_of_strays(const CollisionSurface& sur
 
 template <int Dim>
 bool ContactCandidates<Dim>::search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx,
-                                    double reach, double share, std::size_t most) {
+                                    double reach, double fraction, std::size_t most) {
   const bool keep_trees = surface_ == &surface && revision_ == surface.revision;
   if (!keep_trees) at_rest_ = 0;
   const bool few_edges = Dim == 2 ? are_few(surface, surface.edges) : are_few_edge_pairs(surface);
   const bool few_triangles = are_few(surface, surface.triangles);
   has_trees_ = Dim == 3 && !few_edges && !few_triangles;
-  const double room = room_for(surface, dx, reach, share);
+  const double room = room_for(surface, dx, reach, fraction);
   boxes_.resize(surface.vertices.size());
   rooms_.resize(surface.vertices.size());
   reach_.resize(surface.area.size());

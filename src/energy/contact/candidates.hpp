@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/contact/surface.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/distance.hpp"
@@ -66,12 +66,13 @@ class ContactCandidates {
     hold(surface, x, nullptr, reach, kNoLimit);
   }
   /// Makes the pairs hold for the motion of x by dx. Where these would be more than most_now(), `part` gets the longest of
-  /// dx / 2, dx / 4, ... that takes no more, or that is shorter than `reach`. Returns the share of dx that the pairs hold
+  /// dx / 2, dx / 4, ... that takes no more, or that is shorter than `reach`. Returns the fraction of dx that the pairs hold
   /// for, at most `longest`.
-  double update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,
+  double update(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, ScratchVector& part,
                 double longest = 1);
   /// Finds the pairs of a motion anew with less room around it. Search trees of the surface are used again.
-  void foresee(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part);
+  void predict_motion(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
+                      ScratchVector& part);
   /// Most pairs of each kind for a motion: far motions sweep boxes in which each primitive meets all others.
   static std::size_t most_pairs(const CollisionSurface& surface);
 
@@ -91,15 +92,15 @@ class ContactCandidates {
   /// Makes the pairs hold for x and, where it is given, for the motion by dx. Returns false, and holds nothing, if more than
   /// `most` pairs of a kind do.
   bool hold(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, std::size_t most);
-  /// Searches for the pairs of a motion anew, with this share of the motion for room.
-  bool search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double share,
+  /// Searches for the pairs of a motion anew, with this fraction of the motion for room.
+  bool search(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double fraction,
               std::size_t most);
   /// most_pairs(), or more where bodies at rest have more than a quarter of it.
   std::size_t most_now(const CollisionSurface& surface) const;
-  double search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, KeptVector& part,
-                     double share);
+  double search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach,
+                     ScratchVector& part, double fraction);
   /// Room around a motion, so that the pairs serve a whole line search and often the next one [m].
-  static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double share);
+  static double room_for(const CollisionSurface& surface, const ConstVectorView* dx, double reach, double fraction);
   double room_of(int v, const ConstVectorView* dx, double reach, double room) const;
   /// Finds the vertices that left their boxes, or whose boxes are much too roomy.
   void find_strays(const CollisionSurface& surface, ConstVectorView x, const ConstVectorView* dx, double reach, double room);

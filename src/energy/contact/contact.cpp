@@ -10,8 +10,8 @@
 #include <limits>
 
 #include "candidates.hpp"
-#include "core/kept_vector.hpp"
 #include "core/parallel_reduce.hpp"
+#include "core/scratch_vector.hpp"
 #include "geometry/ccd.hpp"
 #include "pairs.hpp"
 
@@ -21,15 +21,15 @@ namespace {
 
 constexpr double kKeptGap = 0.5;  ///< of the gap, or of the activation distance where the gap is wider
 
-/// Which shares of their ways the vertices of a pair may go, from 0 to 1, for a plane to stay between its primitives all the
-/// way. `dhat`: they may come as near as half of it, or of their distance.
+/// Which fractions of their steps the vertices of a pair may go, from 0 to 1, for a plane to stay between its primitives all
+/// the way. `dhat`: they may come as near as half of it, or of their distance.
 template <int Dim>
-std::array<double, 4> planar_shares(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& way, double dhat) {
-  std::array<double, 4> shares{1, 1, 1, 1};
+std::array<double, 4> planar_fractions(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& motion, double dhat) {
+  std::array<double, 4> fractions{1, 1, 1, 1};
   const int size = pair_size(kind), first = size_of_first(kind);
   Positions<Dim> q;
-  for (int k = 0; k < size; ++k) q[k] = p[k] + way[k];
-  if (!ways_overlap<Dim>(kind, p, q)) return shares;
+  for (int k = 0; k < size; ++k) q[k] = p[k] + motion[k];
+  if (!motions_overlap<Dim>(kind, p, q)) return fractions;
   const ClosestFeatures closest = closest_features<Dim>(kind, p.data());
   Positions<Dim> features;
   for (int k = 0; k < pair_size(closest.kind); ++k) features[k] = p[closest.local[k]];
@@ -44,7 +44,7 @@ std::array<double, 4> planar_shares(PairKind kind, const Positions<Dim>& p, cons
   double first_approach = 0, second_approach = 0;
   for (int k = 0; k < size; ++k) {
     height[k] = normal.dot(p[k] - p[0]);
-    approach[k] = (k < first ? -1 : 1) * normal.dot(way[k]);
+    approach[k] = (k < first ? -1 : 1) * normal.dot(motion[k]);
     if (k < first) {
       low = std::min(low, height[k]);
       first_approach = std::max(first_approach, approach[k]);
@@ -56,24 +56,24 @@ std::array<double, 4> planar_shares(PairKind kind, const Positions<Dim>& p, cons
   const double gap = low - high;
   const double room = gap - kKeptGap * std::min(gap, dhat);
   const double total = first_approach + second_approach;
-  if (total <= room) return shares;
+  if (total <= room) return fractions;
   for (int k = 0; k < size; ++k) {
     if (approach[k] <= 0) continue;
     const double own =
         k < first ? height[k] - low + room * first_approach / total : high - height[k] + room * second_approach / total;
-    shares[k] = std::clamp(own / approach[k], 0.0, 1.0);
+    fractions[k] = std::clamp(own / approach[k], 0.0, 1.0);
   }
-  return shares;
+  return fractions;
 }
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kBlock = 64;
 constexpr std::size_t kBatch = 1024;  ///< local Hessians that are held at a time
 
-/// Share of the way from p to q that is free of contact, by conservative CCD.
+/// Fraction of the way from p to q that is free of contact, by conservative CCD.
 template <int Dim>
-double free_share(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q, const CcdOptions& options = {}) {
-  if (!ways_overlap<Dim>(kind, p, q)) return 1;
+double free_fraction(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q, const CcdOptions& options = {}) {
+  if (!motions_overlap<Dim>(kind, p, q)) return 1;
   if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2], options);
   if constexpr (Dim == 3)
     return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], options)
@@ -167,17 +167,17 @@ Vec<Dim> span_normal(PairKind kind, const Positions<Dim>& p) {
   }
 }
 
-/// The signed gap of a pair at the end of its way, of which `share` is free, linearised there: over the line or plane of
+/// The signed gap of a pair at the end of its way, of which `fraction` is free, linearised there: over the line or plane of
 /// its primitives where their insides meet, else along the direction in which their closest features meet.
 template <int Dim>
 BlockingPairs::Bound bound_gap(PairKind kind, const std::array<int, 4>& vertices, const Positions<Dim>& p,
-                               const Positions<Dim>& way, double share, double dhat) {
+                               const Positions<Dim>& motion, double fraction, double dhat) {
   constexpr double kDegenerate = 1e-3, kKept = 0.5, kKeptOfWide = 0.3;  // the last is above what CCD keeps
   const int size = pair_size(kind);
   Positions<Dim> hit, end;
   for (int k = 0; k < size; ++k) {
-    hit[k] = p[k] + share * way[k];
-    end[k] = p[k] + way[k];
+    hit[k] = p[k] + fraction * motion[k];
+    end[k] = p[k] + motion[k];
   }
   const ClosestFeatures features = closest_features<Dim>(kind, hit.data());
   Positions<Dim> closest;
@@ -208,33 +208,33 @@ BlockingPairs::Bound bound_gap(PairKind kind, const std::array<int, 4>& vertices
   return bound;
 }
 
-/// By vertex, the share of its way that is free.
-struct Shares {
+/// By vertex, the fraction of its way that is free.
+struct Fractions {
   std::vector<double> of_vertex;
 };
 
 /// Memory of a way whose pairs are too many at a time.
-struct PartOfWay {
-  KeptVector way, from;
+struct PartOfStep {
+  ScratchVector motion, from;
 };
 
 constexpr int kMostParts = 16;
 
 /// Walks from x along dx, part by part where its pairs are too many at a time, up to the first part that is not free.
-/// `free_share_of(x, way)` says how much of a part is. Returns the share of dx that is free, at most that of kMostParts
+/// `free_share_of(x, way)` says how much of a part is. Returns the fraction of dx that is free, at most that of kMostParts
 /// parts.
-template <int Dim, typename FreeShare>
+template <int Dim, typename FreeFraction>
 double walk(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx, double reach, Workspace& workspace,
-            const FreeShare& free_share_of) {
+            const FreeFraction& free_fraction_of) {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  auto& [part, from] = workspace.get<PartOfWay>();
+  auto& [part, from] = workspace.get<PartOfStep>();
   double length = candidates.update(surface, x, dx, reach, part);
-  if (length == 1) return free_share_of(x, dx);
+  if (length == 1) return free_fraction_of(x, dx);
   double done = 0;
   from = x;
   for (int k = 0; k < kMostParts; ++k) {
-    const double share = free_share_of(from.view(), part.view());
-    if (share < 1) return done + share * length;
+    const double fraction = free_fraction_of(from.view(), part.view());
+    if (fraction < 1) return done + fraction * length;
     done += length;
     if (done >= 1) break;
     from = x + done * dx;
@@ -255,7 +255,7 @@ template <int Dim>
 void ContactEnergy<Dim>::renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness,
                                double scale) {
   surface_ = &surface;
-  dhat_ = options.activation_distance;
+  dhat_ = options.dhat;
   passing_ratio_ = options.adaptive_stiffness ? 1 : CcdOptions{}.passing_ratio;
   convergent_ = options.convergent;
   stiffness_ = stiffness;
@@ -295,7 +295,7 @@ struct ContactEnergy<Dim>::ActiveCache {
   int revision = 0;
   double dhat = 0;
   bool convergent = false;
-  KeptVector x;
+  ScratchVector x;
   Active active;
 };
 
@@ -435,7 +435,7 @@ void ContactEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
 
 template <int Dim>
 double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
-  return walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView way) {
+  return walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView motion) {
     double least = 1;
     for (const auto& [kind, list] : workspace.get<ContactCandidates<Dim>>().all()) {
       // Later pairs of a block are only asked about the part of the way that earlier ones left over; blocks do not depend on
@@ -446,9 +446,9 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
         for (std::size_t i = begin; i < end; ++i) {
           const auto vertices = vertices_of(*surface_, kind, pairs[i]);
           const auto p = gather<Dim>(vertices, pair_size(kind), from);
-          auto q = gather<Dim>(vertices, pair_size(kind), way);
+          auto q = gather<Dim>(vertices, pair_size(kind), motion);
           for (int k = 0; k < pair_size(kind); ++k) q[k] = p[k] + step * q[k];
-          step *= free_share<Dim>(kind, p, q, {.passing_ratio = passing_ratio_});
+          step *= free_fraction<Dim>(kind, p, q, {.passing_ratio = passing_ratio_});
         }
         return step;
       };
@@ -459,56 +459,56 @@ double ContactEnergy<Dim>::max_step(ConstVectorView x, ConstVectorView dx, Works
 }
 
 template <int Dim>
-bool ContactEnergy<Dim>::get_single_ways(ConstVectorView x, ConstVectorView dx, VectorView ways,
-                                         Workspace& workspace) const {
+bool ContactEnergy<Dim>::get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps,
+                                          Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  auto& part = workspace.get<PartOfWay>().way;
+  auto& part = workspace.get<PartOfStep>().motion;
   if (candidates.update(*surface_, x, dx, dhat_, part) == 1)
-    ways = dx;
+    steps = dx;
   else
-    ways = part.view();
-  auto& share = workspace.get<Shares>().of_vertex;
-  share.assign(surface_->area.size(), 1);
+    steps = part.view();
+  auto& fraction = workspace.get<Fractions>().of_vertex;
+  fraction.assign(surface_->area.size(), 1);
   for (const auto& [kind, list] : candidates.all()) {
     const auto& pairs = *list;
-    const auto shares_of = [&, kind = kind](std::size_t i) {
+    const auto fractions_of = [&, kind = kind](std::size_t i) {
       const auto vertices = vertices_of(*surface_, kind, pairs[i]);
       const int size = pair_size(kind);
-      return planar_shares<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, ways), dhat_);
+      return planar_fractions<Dim>(kind, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, steps), dhat_);
     };
-    const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& shares) {
+    const auto note = [&, kind = kind](std::size_t i, const std::array<double, 4>& fractions) {
       const auto vertices = vertices_of(*surface_, kind, pairs[i]);
-      for (int k = 0; k < pair_size(kind); ++k) share[vertices[k]] = std::min(share[vertices[k]], shares[k]);
+      for (int k = 0; k < pair_size(kind); ++k) fraction[vertices[k]] = std::min(fraction[vertices[k]], fractions[k]);
     };
-    parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, shares_of, note);
+    parallel_then_ordered<std::array<double, 4>>(pairs.size(), kBlock, fractions_of, note);
   }
-  for (const int v : surface_->vertices) ways.segment<Dim>(Dim * v) *= share[v];
+  for (const int v : surface_->vertices) steps.segment<Dim>(Dim * v) *= fraction[v];
   return true;
 }
 
 template <int Dim>
-bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, double share, BlockingPairs& blocking,
+bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                                        Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  share = std::min(share, candidates.update(*surface_, x, dx, dhat_, workspace.get<PartOfWay>().way));
-  struct Way {
+  fraction = std::min(fraction, candidates.update(*surface_, x, dx, dhat_, workspace.get<PartOfStep>().motion));
+  struct PairMotion {
     std::array<int, 4> vertices;
-    Positions<Dim> from, way;
-    double free_share_of(PairKind kind, double part) const {
+    Positions<Dim> from, motion;
+    double free_fraction_of(PairKind kind, double part) const {
       Positions<Dim> to;
-      for (int k = 0; k < pair_size(kind); ++k) to[k] = from[k] + part * way[k];
-      return free_share<Dim>(kind, from, to);
+      for (int k = 0; k < pair_size(kind); ++k) to[k] = from[k] + part * motion[k];
+      return free_fraction<Dim>(kind, from, to);
     }
   };
-  const auto way_of = [&](PairKind kind, const std::array<int, 2>& pair) {
+  const auto pair_motion_of = [&](PairKind kind, const std::array<int, 2>& pair) {
     const auto vertices = vertices_of(*surface_, kind, pair);
     const int size = pair_size(kind);
-    return Way{vertices, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx)};
+    return PairMotion{vertices, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx)};
   };
   for (const auto& [kind, list] : candidates.all()) {
     const auto& pairs = *list;
     const auto is_stopped = [&, kind = kind](std::size_t i) {
-      return way_of(kind, pairs[i]).free_share_of(kind, share) < 1;
+      return pair_motion_of(kind, pairs[i]).free_fraction_of(kind, fraction) < 1;
     };
     const auto note = [&, kind = kind](std::size_t i, bool stopped) {
       const std::array<int, 3> pair{static_cast<int>(kind), pairs[i][0], pairs[i][1]};
@@ -520,28 +520,30 @@ bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, do
   blocking.bounds.clear();
   for (const auto& [kind_index, first, second] : blocking.pairs) {
     const auto kind = static_cast<PairKind>(kind_index);
-    const Way way = way_of(kind, {first, second});
-    blocking.bounds.push_back(bound_gap<Dim>(kind, way.vertices, way.from, way.way, way.free_share_of(kind, 1), dhat_));
+    const PairMotion motion = pair_motion_of(kind, {first, second});
+    blocking.bounds.push_back(
+        bound_gap<Dim>(kind, motion.vertices, motion.from, motion.motion, motion.free_fraction_of(kind, 1), dhat_));
   }
   return true;
 }
 
 template <int Dim>
-void ContactEnergy<Dim>::foresee(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
-  workspace.get<ContactCandidates<Dim>>().foresee(*surface_, x, dx, dhat_, workspace.get<PartOfWay>().way);
+void ContactEnergy<Dim>::predict_motion(ConstVectorView x, const VectorX& dx, Workspace& workspace) const {
+  workspace.get<ContactCandidates<Dim>>().predict_motion(*surface_, x, dx, dhat_, workspace.get<PartOfStep>().motion);
 }
 
 template <int Dim>
 StepLimit ContactEnergy<Dim>::step_limit(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const {
   constexpr CcdOptions kNear{.passing_ratio = 1};  // what comes near is told too: it is what holds back
   StepLimit least;
-  least.step = walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView way) {
-    const VectorX end = from + way;
+  least.step = walk<Dim>(*surface_, x, dx, dhat_, workspace, [&](ConstVectorView from, ConstVectorView motion) {
+    const VectorX end = from + motion;
     for (const auto& [kind, pairs] : workspace.get<ContactCandidates<Dim>>().all())
       for (const auto& pair : *pairs) {
         const auto vertices = vertices_of(*surface_, kind, pair);
         const int size = pair_size(kind);
-        const double t = free_share<Dim>(kind, gather<Dim>(vertices, size, from), gather<Dim>(vertices, size, end), kNear);
+        const double t =
+            free_fraction<Dim>(kind, gather<Dim>(vertices, size, from), gather<Dim>(vertices, size, end), kNear);
         if (t < least.step) least = {t, name_of(kind), {vertices.begin(), vertices.begin() + size}};
       }
     return least.step;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "core/kept_vector.hpp"
+#include "core/scratch_vector.hpp"
 #include "energy/contact/contact.hpp"
 #include "energy/velocity_rule.hpp"
 
@@ -38,7 +38,7 @@ class FrictionEnergy final : public Energy {
 
   std::vector<Pair> pairs_;
   double rate_ = 1;  ///< and the reference of VelocityRule
-  KeptVector reference_;
+  ScratchVector reference_;
   double epsv_ = 0;
   double scale_ = 1;
 };

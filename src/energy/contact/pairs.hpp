@@ -33,7 +33,7 @@ inline std::array<int, 4> vertices_of(const CollisionSurface& surface, PairKind 
 
 /// Whether the boxes around the ways of both primitives from p to q overlap.
 template <int Dim>
-bool ways_overlap(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
+bool motions_overlap(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q) {
   Box<Dim> first, second;
   for (int k = 0; k < pair_size(kind); ++k) {
     Box<Dim>& box = k < size_of_first(kind) ? first : second;

@@ -29,7 +29,7 @@ AdaptiveStiffness<Dim>::AdaptiveStiffness(const CollisionSurface& surface, const
     : surface_(surface),
       plain_(surface, plain_form(options), 1, 1),
       actual_(surface, options, 1, 1),
-      dhat_(options.activation_distance),
+      dhat_(options.dhat),
       convergent_(options.convergent),
       average_mass_(average_mass),
       scale_(scale),

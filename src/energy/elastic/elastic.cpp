@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t kBlock = 256;
 
 struct PositionScratch {
-  KeptVector x;
+  ScratchVector x;
 };
 
 template <int Dim>

@@ -16,7 +16,7 @@ namespace {
 template <int Dim>
 constexpr int kRefinements = Dim == 2 ? 4 : 3;  ///< d
 template <int Dim>
-constexpr double kShare = 1.0 / (1 << kRefinements<Dim>);
+constexpr double kFraction = 1.0 / (1 << kRefinements<Dim>);
 template <int Dim>
 constexpr std::size_t kCoefficients = Dim == 2 ? 6 : 20;
 
@@ -180,7 +180,7 @@ double JacobianBarrier<Dim>::value() const {
   if (least_ratio_ == 0) return std::numeric_limits<double>::infinity();
   double sum = 0;
   for (const Active& active : active_) sum += phi(active.ratio, kActive).value;
-  return kShare<Dim> * sum;
+  return kFraction<Dim> * sum;
 }
 
 template <int Dim>
@@ -200,7 +200,7 @@ typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::gradient() const {
   for (std::size_t p = 0, next = 0; p < parts_.size(); ++p) {
     const Shapes shapes = shapes_of(parts_[p]);
     for (; next < active_.size() && active_[next].part == p; ++next) {
-      const double slope = kShare<Dim> / mean_ * phi(active_[next].ratio, kActive).first;
+      const double slope = kFraction<Dim> / mean_ * phi(active_[next].ratio, kActive).first;
       add_gradient(parts_[p], shapes, active_[next].coefficient, slope, gradient);
       of_mean -= slope * active_[next].ratio;
     }
@@ -228,8 +228,8 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
       Nodal of_ratio = -ratio / mean_ * of_mean;
       add_gradient(parts_[p], shapes, k, 1 / mean_, of_ratio);
       const Eigen::Map<const Column> ds(of_ratio.data());
-      block.noalias() += (kShare<Dim> * value.second * ds) * ds.transpose();
-      const double slope = kShare<Dim> / mean_ * value.first;
+      block.noalias() += (kFraction<Dim> * value.second * ds) * ds.transpose();
+      const double slope = kFraction<Dim> / mean_ * value.first;
       add_hessian(parts_[p], shapes, k, slope, second);
       mixed -= slope * ds;
       mean_factor -= slope * ratio;

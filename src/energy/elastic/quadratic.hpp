@@ -28,9 +28,9 @@
 namespace itr {
 
 constexpr std::size_t kCurvedBlock = 64;
-constexpr double kInversionMargin = 0.9;  ///< share of the way to a vanishing volume that one step may go
+constexpr double kInversionMargin = 0.9;  ///< fraction of the way to a vanishing volume that one step may go
 constexpr double kLeastStep = 1e-12;
-constexpr double kBlindShare = 0.2;      ///< of det F at quadrature points: where it is less, they do not see it
+constexpr double kBlindFraction = 0.2;   ///< of det F at quadrature points: where it is less, they do not see it
 constexpr double kBlindTolerance = 0.1;  ///< relative, of the bound that tells
 /// Where the Jacobian varies less, det F is anywhere at least ((1 - 0.2) / (1 + 0.2))^3 of what points see, 0.29.
 constexpr double kSeen = 0.2;
@@ -198,7 +198,7 @@ class QuadraticElasticity {
         const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
         const DisplacementGradient<Dim> at{displacements * gradients.transpose()};
         const Mat<Dim> P = elastic_stress<Dim>(at, moduli(e, q));
-        forces.noalias() += (scale_ * rule[q].share * element.volume) * (P * gradients);
+        forces.noalias() += (scale_ * rule[q].fraction * element.volume) * (P * gradients);
       }
       if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x)); barrier.is_active())
         forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
@@ -229,7 +229,7 @@ class QuadraticElasticity {
       for (std::size_t q = 0; q < rule.size(); ++q) {
         const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
         const Mat<Dim> F = positions * gradients.transpose();
-        const double weight = scale_ * rule[q].share * element.volume;
+        const double weight = scale_ * rule[q].fraction * element.volume;
         const ElasticModuli& here = moduli(e, q);
         if (!is_neo_hookean) {
           modes.add(elastic_eigensystem<Dim>(F, here), psd, gradients, weight);
@@ -306,7 +306,7 @@ class QuadraticElasticity {
                const auto& rule = this->rule(e);
                for (std::size_t q = 0; q < rule.size(); ++q) {
                  const Mat<Dim> G = displacements * shape_gradients<Dim>(element, rule[q].weights).transpose();
-                 sum += rule[q].share * element.volume * at_point(DisplacementGradient<Dim>{G}, moduli(e, q));
+                 sum += rule[q].fraction * element.volume * at_point(DisplacementGradient<Dim>{G}, moduli(e, q));
                }
                const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x));
                sum += element.volume * barrier_density<Dim>(barrier, moduli_at_barycenter(e));
@@ -337,7 +337,7 @@ class QuadraticElasticity {
     double seen = std::numeric_limits<double>::infinity();
     for (const auto& point : rule(e))
       seen = std::min(seen, (positions * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
-    const double enough = kBlindShare * seen / element.inverse_edges.determinant();
+    const double enough = kBlindFraction * seen / element.inverse_edges.determinant();
     return min_jacobian_bound<Dim>(all, kBlindTolerance, enough) < enough;
   }
   const ElasticModuli& moduli_at_barycenter(std::size_t e) const {

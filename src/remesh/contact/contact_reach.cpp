@@ -10,7 +10,7 @@ namespace {
 
 /// How far vertices may move, at least: in longest edges of what moves, and in activation distances.
 constexpr double kRoomInEdges = 0.1, kRoomInDistances = 2;
-/// Share of the room that is enough where contact can be left out.
+/// Fraction of the room that is enough where contact can be left out.
 constexpr double kLeastRoom = 0.25;
 
 template <int Dim>

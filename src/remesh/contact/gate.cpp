@@ -147,7 +147,7 @@ template <int Dim>
 Gate<Dim>::Gate(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context)
     : mesh_(mesh), has_contact_(context.contact.enabled), primitives_(ObstaclePrimitives::make<Dim>(context.obstacles)) {
   configurations_.reserve(1 + fields.past_positions.size());
-  const double span = has_contact_ ? span_of_clearances(mesh, fields.x, context.contact.activation_distance) : 0;
+  const double span = has_contact_ ? span_of_clearances(mesh, fields.x, context.contact.dhat) : 0;
   configurations_.push_back({&fields.x, {mesh, fields.x, primitives_, context.obstacles.x, span}});
   for (std::size_t i = 0; i < fields.past_positions.size(); ++i)
     configurations_.push_back(

@@ -78,7 +78,7 @@ class MotionBound final : public Energy {
 
  private:
   std::vector<int> bounded_;
-  KeptVector start_;
+  ScratchVector start_;
   double room_ = 0;
 };
 
@@ -162,7 +162,7 @@ Vec<Dim> LocalProblem<Dim>::field_value(const VectorX& field, const std::vector<
 
 template <int Dim>
 ConstVectorView LocalProblem<Dim>::gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values,
-                                          KeptVector& values) const {
+                                          ScratchVector& values) const {
   VectorView view = values.resize(static_cast<Eigen::Index>(Dim * vertices_.size()));
   for (std::size_t i = 0; i < vertices_.size(); ++i)
     view.segment<Dim>(Dim * static_cast<int>(i)) = field_value(field, obstacle_values, vertices_[i]);

@@ -56,7 +56,7 @@ struct LocalStorage {
   std::vector<char> held;     ///< by dof
   CollisionSurface surface;   ///< where it touches contact
   DofMap dofs;
-  KeptVector x, predictor, velocity_reference, norm_weights;
+  ScratchVector x, predictor, velocity_reference, norm_weights;
   std::optional<IncrementalPotential<Dim>> potential;  ///< of `cells`
   std::shared_ptr<MotionBound<Dim>> motion_bound;
   EnergySum energy;
@@ -136,7 +136,7 @@ class LocalProblem {
   void find_stars_of_touching();
   void add_surface();
   void find_what_changes();
-  ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, KeptVector& values) const;
+  ConstVectorView gather(const VectorX& field, const std::vector<Vec<Dim>>& obstacle_values, ScratchVector& values) const;
   void add_terms();
   void set_quadrature(ConstVectorView x);
   void add_unrepresented_history(InertiaEnergy<Dim>& inertia) const;
@@ -157,7 +157,7 @@ class LocalProblem {
   std::vector<LocalVertex>& vertices_ = storage_->vertices;
   std::vector<char>& changes_ = storage_->changes;
   DofMap& dofs_ = storage_->dofs;
-  KeptVector& x_ = storage_->x;
+  ScratchVector& x_ = storage_->x;
   EnergySum& energy_ = storage_->energy;
   Workspace& workspace_ = storage_->workspace;
   bool has_surface_ = false, touches_contact_ = false;

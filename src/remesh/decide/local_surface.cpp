@@ -56,8 +56,8 @@ void LocalProblem<Dim>::find_contacts() {
   if (is_after_)
     for (const auto& facet : edit_.inserted_facets) add(facet.vertices, kNone);
   // Chords are short beside the edges of their facets, which give the room, so that most of them could touch some.
-  reach.find(state_.surface, scratch_.neighbourhoods, state_.context.contact.activation_distance, scratch_.hits,
-             mesh_.has_nodes(), [&](FacetId f) { return is_removed(f); });
+  reach.find(state_.surface, scratch_.neighbourhoods, state_.context.contact.dhat, scratch_.hits, mesh_.has_nodes(),
+             [&](FacetId f) { return is_removed(f); });
 }
 
 /// Finds the facets that stay and the primitives of obstacles around the vertices that can touch, ascending.
@@ -151,8 +151,8 @@ void LocalProblem<Dim>::add_surface() {
   dofs_.unknown.resize(Dim * vertices_.size(), kNone);
   changes_.resize(vertices_.size(), 0);
   surface.counts = changes_;
-  surface.closed = closed_faces<Dim>(cells_.rest, state_.context.contact.activation_distance, 0,
-                                     [&](int i) { return is_closed(vertices_[i]); });
+  surface.closed =
+      closed_faces<Dim>(cells_.rest, state_.context.contact.dhat, 0, [&](int i) { return is_closed(vertices_[i]); });
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 

@@ -19,9 +19,9 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-/// The share of its model's gain that a vertex moved by the forces an edit adds gets: cells around, not in the model,
+/// The fraction of its model's gain that a vertex moved by the forces an edit adds gets: cells around, not in the model,
 /// resist.
-constexpr double kShareOfRelaxation = 0.25;
+constexpr double kFractionOfRelaxation = 0.25;
 
 /// A cell on these vertices after an edit.
 template <int Dim>
@@ -91,13 +91,13 @@ double predict_gain_of_each(const RemeshState<Dim>& state, const Edit<Dim>& edit
     const Vec<Dim> force = is_set ? after.gradient(i) : Vec<Dim>(after.gradient(i) - before.gradient(i));
     const Eigen::LLT<Mat<Dim>> llt(after.hessian(i));
     if (llt.info() != Eigen::Success) return kUnknown;
-    gain += (is_set ? 1 : kShareOfRelaxation) * 0.5 * force.dot(llt.solve(force));
+    gain += (is_set ? 1 : kFractionOfRelaxation) * 0.5 * force.dot(llt.solve(force));
   }
   return gain;
 }
 
-/// Share of the forgotten history that no relaxation regains (ball-wall 2D: a share of 1 refuses so many collapses that a
-/// sixth more vertices stay).
+/// Fraction of the forgotten history that no relaxation regains (ball-wall 2D: a fraction of 1 refuses so many collapses
+/// that a sixth more vertices stay).
 constexpr double kLeastForgotten = 0.3;
 
 }  // namespace
@@ -117,7 +117,7 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
     }
     // There in the new mesh.
     double deepest = -std::numeric_limits<double>::infinity();
-    Vec<Dim> way = Vec<Dim>::Zero(), predictor = way;
+    Vec<Dim> step = Vec<Dim>::Zero(), predictor = step;
     for (const auto& [cell, body] : edit.inserted_cells) {
       std::array<Vec<Dim>, Dim + 1> rest;
       for (int k = 0; k <= Dim; ++k) rest[k] = rest_after(state.mesh, edit, cell[k]);
@@ -125,16 +125,16 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
       const double depth = std::min(weights.minCoeff(), 1 - weights.sum());
       if (depth <= deepest) continue;
       deepest = depth;
-      way = predictor = Vec<Dim>::Zero();
+      step = predictor = Vec<Dim>::Zero();
       for (int k = 0; k <= Dim; ++k) {
         const double weight = k == 0 ? 1 - weights.sum() : weights[k - 1];
         const Vec<Dim> x_hat = after(state.fields.predictor, cell[k]);
         predictor += weight * x_hat;
-        way += weight * (after(state.fields.x, cell[k]) - x_hat);
+        step += weight * (after(state.fields.x, cell[k]) - x_hat);
       }
     }
     const Vec<Dim> gap = state.fields.predictor.template segment<Dim>(Dim * v) - predictor;
-    forgotten += mass * (gap.squaredNorm() / (Dim + 2) - gap.dot(way));
+    forgotten += mass * (gap.squaredNorm() / (Dim + 2) - gap.dot(step));
   }
   return kLeastForgotten * forgotten;
 }
@@ -257,7 +257,7 @@ double predict_curve(const RemeshState<Dim>& state, const EdgeKey& edge) {
     const int node = place_of_node<Dim>(mesh.cell(c), edge);
     const auto [i, j] = ends_of_node<Dim>(node);
     cell.curved = static_cast<CurvedEdges>(cell.curved | 1 << (node - Dim - 1));
-    for (QuadraticCell<Dim>* values : {&cell.x, &cell.way}) values->col(node) = (values->col(i) + values->col(j)) / 2;
+    for (QuadraticCell<Dim>* values : {&cell.x, &cell.step}) values->col(node) = (values->col(i) + values->col(j)) / 2;
     model.add(cell, mesh.body(c), CellModel<Dim>::moving(node));
   }
   const Vec<Dim> middle = (mesh.rest(edge[0]) + mesh.rest(edge[1])) / 2;
@@ -289,7 +289,7 @@ double predict_straighten(const RemeshState<Dim>& state, const EdgeKey& edge) {
     const auto [i, j] = ends_of_node<Dim>(node);
     const Vec<Dim> move = (cell.x.col(i) + cell.x.col(j)) / 2 - cell.x.col(node);
     cell.x.col(node) += move;
-    cell.way.col(node) += move;
+    cell.step.col(node) += move;
     after.add(cell, mesh.body(c));
   }
   return after.has_barrier() ? kCannotTell : before.energy() - after.energy();

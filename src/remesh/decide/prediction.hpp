@@ -37,7 +37,7 @@ inline constexpr double kPatchOverPredictionInContact = Dim == 2 ? 10 : 5;
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
-/// Lower estimate of what an edit that sets a vertex forgets of the history: a share of the square of the gap between the
+/// Lower estimate of what an edit that sets a vertex forgets of the history: a fraction of the square of the gap between the
 /// old and the new predictor at the place of each vertex that goes or moves, times its hat function on the old cells. It is
 /// below the exact value of forgotten_history, which takes much longer, in each of 815 random collapses and in all but 2 of
 /// 922 moves from x = x-hat. [J, times the scaling]

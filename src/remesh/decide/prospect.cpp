@@ -47,7 +47,7 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   for (const CellId c : mesh.live_cells()) {
     PlacedCell<Dim> cell = place(mesh, fields, terms, cell_before(mesh, c), no_edit<Dim>());
     if (!fields.levels.empty()) cell.level = fields.levels[c];
-    cell.way.colwise() -= fall;
+    cell.step.colwise() -= fall;
     CellModel<Dim> model(terms, mesh.part(c));
     model.add(cell, mesh.body(c));
     energy[mesh.part(c)] += model.energy();

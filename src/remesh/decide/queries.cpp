@@ -49,7 +49,7 @@ Refusal RemeshQueries<Dim>::refuse_split(const EdgeKey& e) const {
 
 template <int Dim>
 bool RemeshQueries<Dim>::has_short_halves(const EdgeKey& e) const {
-  const double dhat = context_.contact.activation_distance;
+  const double dhat = context_.contact.dhat;
   const auto x = [&](VertexId v) { return fields_.x.template segment<Dim>(Dim * v); };
   return rest_length(e) < 2 * dhat || (x(e[0]) - x(e[1])).norm() < 2 * dhat;
 }
@@ -57,7 +57,7 @@ bool RemeshQueries<Dim>::has_short_halves(const EdgeKey& e) const {
 template <int Dim>
 bool RemeshQueries<Dim>::makes_short_chords(const EdgeKey& e) const {
   if (!mesh_.has_nodes()) return false;
-  const double dhat = context_.contact.activation_distance;
+  const double dhat = context_.contact.dhat;
   const Edit<Dim> edit = make_split(mesh_, e);
   const auto rest = [&](VertexId v) { return rest_after(mesh_, edit, v); };
   const auto x = [&](VertexId v) { return fields_.after(fields_.x, edit, v); };
@@ -122,13 +122,13 @@ double RemeshQueries<Dim>::reach(const EdgeKey& e) const {
   double motion = 0;
   if (!fields_.past_positions.empty() && context_.has_inertia)
     for (const VertexId v : e) motion = std::max(motion, (at(fields_.x, v) - at(fields_.past_positions[0], v)).norm());
-  return context_.contact.activation_distance + motion;
+  return context_.contact.dhat + motion;
 }
 
 template <int Dim>
 bool RemeshQueries<Dim>::overhangs(const EdgeKey& e, LocalScratch<Dim>& scratch) const {
   const double height = overhang(e);
-  return height > kMostOverhang * context_.contact.activation_distance && touches_within(e, reach(e) + height, scratch);
+  return height > kMostOverhang * context_.contact.dhat && touches_within(e, reach(e) + height, scratch);
 }
 
 template <int Dim>

@@ -67,8 +67,7 @@ class RemeshQueries {
   bool is_distorted(std::span<const CellId> cells) const;
   /// Whether contact acts on the surface at an edge, so that the bulk terms alone do not tell what an edit gains.
   bool is_in_contact(const Candidate& candidate, LocalScratch<Dim>& scratch) const {
-    return has_contact() && candidate.is_edge() &&
-           touches_within(candidate.edge(), context_.contact.activation_distance, scratch);
+    return has_contact() && candidate.is_edge() && touches_within(candidate.edge(), context_.contact.dhat, scratch);
   }
   /// Finds out whether a trial is in contact, and notes that the surface around its edge was read.
   void find_contact(Trial<Dim>& trial, LocalScratch<Dim>& scratch) const;

@@ -69,7 +69,7 @@ class SplitModel {
     if (!state_.fields.levels.empty()) whole.level = state_.fields.levels[cell.id];
     for_each_edge<Dim>([&](int edge, int i, int j) {
       if (cell.nodes.edges >> edge & 1) return;
-      for (QuadraticCell<Dim>* values : {&whole.x, &whole.way})
+      for (QuadraticCell<Dim>* values : {&whole.x, &whole.step})
         values->col(Dim + 1 + edge) = (values->col(i) + values->col(j)) / 2;
     });
     if (cell.nodes.edges) {  // else the energy stays
@@ -99,7 +99,7 @@ class SplitModel {
     places[moved] = 0;
     const int split = edge_between(moved, other);
     half.x.col(moved) = whole.x.col(split);
-    half.way.col(moved) = whole.way.col(split);
+    half.step.col(moved) = whole.step.col(split);
     for_each_edge<Dim>([&](int edge, int i, int j) {
       const int k = Dim + 1 + edge;
       if (i != moved && j != moved) {
@@ -121,7 +121,7 @@ class SplitModel {
                     0.125 * (from.col(moved) + from.col(other));
       };
       set(whole.x, half.x);
-      set(whole.way, half.way);
+      set(whole.step, half.step);
     });
     return half;
   }

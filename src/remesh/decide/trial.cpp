@@ -12,10 +12,10 @@ namespace itr {
 namespace {
 
 constexpr int kIterationsAfterAcceptance = 100;
-constexpr double kSurelyTooLittle = 0.9;                          ///< share of the required gain, as a prediction
+constexpr double kSurelyTooLittle = 0.9;                          ///< fraction of the required gain, as a prediction
 constexpr int kBoundIterations = 1, kBoundContactIterations = 2;  ///< of Newton, for a vertex alone
 
-/// Share of the barrier's energy around an edit that its weights, which depend on the mesh, can feign as a gain.
+/// Fraction of the barrier's energy around an edit that its weights, which depend on the mesh, can feign as a gain.
 constexpr double kBarrierNoise = 1;
 
 /// Both sides of a comparison on one support.
@@ -32,7 +32,7 @@ struct Comparison {
 /// on with it.
 template <int Dim, typename Accept>
 Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> patch, const Edit<Dim>& edit, double required,
-                        double noise_share, int iterations, int contact_iterations, LocalScratch<Dim>& scratch,
+                        double noise_fraction, int iterations, int contact_iterations, LocalScratch<Dim>& scratch,
                         const Accept& accept) {
   LocalProblem<Dim> before(state, patch, edit, false, scratch);
   LocalProblem<Dim> after(state, patch, edit, true, scratch);
@@ -43,7 +43,7 @@ Comparison<Dim> compare(const RemeshState<Dim>& state, std::span<const CellId> p
   result.surface_read.include(after.surface_read());
   const int effort = result.touches_contact ? contact_iterations : iterations;
   const double energy_before = before.value();
-  if (noise_share > 0) required += noise_share * before.contact_energy();
+  if (noise_fraction > 0) required += noise_fraction * before.contact_energy();
   result.required = required;
   const double energy_after = after.has_unknowns() ? after.relax(effort).energy : after.value();
   result.gain = energy_before - energy_after;
@@ -106,13 +106,13 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   if (options.patch_over_vertex > 0 && !is_bound_open) {
     find_star(state.mesh, edit, scratch.star);
     // History that the new mesh cannot represent takes the longest to find, so the first of two checks leaves it out.
-    const double noise_share = edit.is_nested() ? kBarrierNoise : 0;
+    const double noise_fraction = edit.is_nested() ? kBarrierNoise : 0;
     const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
     for (int check = is_nested || options.predicted ? 1 : 0; check < 2; ++check) {
       const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
       const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
       is_enough = false;
-      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, noise_share, kBoundIterations,
+      const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, noise_fraction, kBoundIterations,
                                       kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });
       note(bound, Refusal::bound);
       const bool surface_touches = bound.touches_contact && !edit.inserted_facets.empty();

@@ -108,7 +108,7 @@ class SizingField {
   /// At a vertex of the surface: the unit direction to what is nearest of all that its facets are in contact with, over the
   /// distance [1/m]; zero without contact.
   Vec<Dim> contact_at(VertexId vertex) {
-    const double dhat = queries_.context().contact.activation_distance;
+    const double dhat = queries_.context().contact.dhat;
     double least = dhat * dhat;
     Vec<Dim> direction = Vec<Dim>::Zero();
     const auto look_at = [&](const auto& point, int k, const auto& facet) {
@@ -152,7 +152,7 @@ class SizingField {
   /// Finds the pieces that are nearer than dhat to a facet of the surface at present.
   std::vector<Piece> pieces_in_contact(FacetId f) {
     const SurfaceIndex<Dim>& surface = queries_.surface();
-    const double dhat = queries_.context().contact.activation_distance;
+    const double dhat = queries_.context().contact.dhat;
     LocalScratch<Dim>& scratch = session_.scratch();
     std::vector<Piece> pieces;
     for (const auto& [other, distance] : scratch.neighbourhoods.near(surface, f, dhat, scratch.hits)) {

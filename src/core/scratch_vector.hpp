@@ -9,10 +9,10 @@ namespace itr {
 
 /// A vector whose memory stays when its length changes, where Eigen's own is made anew. It begins at an address as aligned
 /// as theirs, so that sums have the same bits.
-class KeptVector {
+class ScratchVector {
  public:
-  KeptVector() = default;
-  KeptVector& operator=(ConstVectorView values) {
+  ScratchVector() = default;
+  ScratchVector& operator=(ConstVectorView values) {
     resize(values.size()) = values;
     return *this;
   }
