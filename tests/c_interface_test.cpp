@@ -247,7 +247,9 @@ std::vector<double> doubles(itr_simulation* simulation, const Get& get, size_t l
 /// A pulled quadratic triangle, in C and by the facade.
 TEST(CInterface, GivesMeshAndStressOfTheFacade) {
   const std::array nodes{0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.5, 0.0, 0.5, 0.5, 0.0, 0.5};
-  const std::array cell{0, 1, 2, 3, 4, 5}, bodies{7}, left{0, 2};
+  const std::array cell{0, 1, 2, 3, 4, 5};
+  const std::array bodies{7};
+  const std::array left{0, 2};
   Model facade_model(2);
   facade_model.set_quadratic_mesh(nodes, cell, bodies);
   facade_model.add_boundary("left", left);

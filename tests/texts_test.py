@@ -15,6 +15,7 @@ prints which was not refused are. Lines that are then equal to the line before a
 import concurrent.futures
 import difflib
 import json
+import math
 import os
 import pathlib
 import re
@@ -49,8 +50,14 @@ FILES = {
     "twice.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 3 4 1\n",
     "loose.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 4 5 6\n",
     "tilted.msh": MSH + "$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 1\n$EndNodes\n$Elements\n1\n1 2 2 3 1 1 2 3\n$EndElements\n",
+    "octagon.obj": "".join(f"v {math.cos(i * math.pi / 4):.6f} {math.sin(i * math.pi / 4):.6f} 0\n" for i in range(8))
+    + "v 0 0 0\n" + "".join(f"f 9 {i + 1} {(i + 1) % 8 + 1}\n" for i in range(8)),
     "wall.obj": "v -1 -1 -1\nv 2 -1 -1\nv -1 -1 2\nf 1 2 3\n",
     "number.json": '{"time": {"dt": 1e999}}',
+    "twice.json": '{"geometry": [{"mesh": "square.obj", "n_refs": 1, "n_refs": 2}]}',
+    "named.msh": MSH + '$PhysicalNames\n3\n1 1 "root"\n1 2 "top"\n2 3 "plate"\n$EndPhysicalNames\n'
+    "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
+    "$Elements\n4\n1 1 2 1 1 4 1\n2 1 2 2 2 3 4\n3 2 2 3 1 1 2 3\n4 2 2 3 1 1 3 4\n$EndElements\n",
     "cut.json": '{\n  "geometry": [\n',
 }
 SQUARE = {
@@ -67,6 +74,13 @@ BASES = {
             {"mesh": "line.obj", "is_obstacle": True, "surface_selection": 8, "transformation": {"translation": [0, -1]}},
         ],
         "contact": {"enabled": True, "dhat": 1e-3},
+    },
+    "named": SQUARE | {
+        "units": {"length": "mm", "mass": "t", "time": "s"},
+        "geometry": [{"mesh": "named.msh"}, {"type": "ground", "height": -0.5, "name": "floor", "is_obstacle": True}],
+        "materials": [{"id": "plate", "type": "NeoHookean", "E": 2000, "nu": 0.35, "rho": 1.1e-9}],
+        "boundary_conditions": {"dirichlet_boundary": [{"id": "root", "value": [0, 0]}]},
+        "contact": {"enabled": True},
     },
 }
 

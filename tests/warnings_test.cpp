@@ -59,6 +59,46 @@ TEST(WarningList, CountsKinds) {
   EXPECT_TRUE(list.take_new().empty());
 }
 
+/// The warning says by how much the force is too large.
+TEST_F(WarningsTest, GapsThatAddToAPrescribedMotionAreToldOf) {
+  std::ofstream(folder_ / "square.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n";
+  std::ofstream(folder_ / "press.json") << R"({
+    "geometry": [{"mesh": "square.obj", "n_refs": 2, "surface_selection": {"threshold": 1e-3}},
+                 {"type": "plane", "point": [0, 1.02], "normal": [0, -1], "is_obstacle": true, "name": "press"}],
+    "materials": {"type": "NeoHookean", "E": 1e6, "nu": 0.3, "rho": 100},
+    "boundary_conditions": {
+      "rhs": [0, 9.81],
+      "dirichlet_boundary": [{"id": 1, "value": [0, 0], "dimension": [true, false]},
+                             {"id": 2, "value": [0, 0], "dimension": [false, true]}],
+      "obstacle_displacements": [{"id": "press", "value": [0, "-0.06 * t"]}]},
+    "time": {"dt": 0.25, "tend": 1, "quasistatic": true},
+    "contact": {"enabled": true},
+    "output": {"forces": [{"name": "press", "obstacles": "press"}]}})";
+  const auto press = [&](const std::string& dhat) {
+    const Said said = itr("run " + (folder_ / "press.json").string() + " -o " + (folder_ / "out").string() +
+                          " --overwrite --set /contact/dhat=" + dhat);
+    EXPECT_EQ(said.status, 0) << said.text;
+    return said.text;
+  };
+  const auto force = [&] {
+    std::ifstream file(folder_ / "out/forces.csv");
+    std::string line, last;
+    while (std::getline(file, line)) last = line;
+    std::istringstream cells(last);
+    for (int i = 0; i < 5; ++i) std::getline(cells, line, ',');
+    return std::stod(line);  // contact_y
+  };
+  const std::string told = " % of the way that bodies would be compressed by";
+  EXPECT_EQ(press("1e-4").find(told), std::string::npos);
+  const double hard = force();
+  const std::string text = press("0.01");
+  const double soft = force();
+  const std::size_t at = text.find(told);
+  ASSERT_NE(at, std::string::npos) << text;
+  const double said = std::stod(text.substr(text.rfind(' ', at - 1))) / 100;
+  EXPECT_NEAR(said, soft / hard - 1, 0.1 * said);
+}
+
 /// Against a tenth of the split tolerance; what is off by more than 2 % is said.
 TEST_F(WarningsTest, SmallerTolerancesGiveNoLargerErrors) {
   const std::string press = "--set /time/tend=0.3 --set /time/quasistatic=true --overwrite ";

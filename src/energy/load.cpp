@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "energy/load.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include "energy/elastic/laws.hpp"
 #include "fem/quadrature.hpp"
-
 #include "load_points.hpp"
 
 namespace itr {

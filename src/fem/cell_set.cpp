@@ -10,11 +10,10 @@ CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extr
   set.rest.insert(set.rest.end(), extra.begin(), extra.end());
   set.num_vertices = static_cast<int>(set.rest.size());
   std::vector<typename CellSet<Dim>::Element> curved;
-  for (const CellId c : mesh.live_cells())
-    if (const auto element = element_of(mesh, c); element.curved)
-      curved.push_back(element);
-    else
-      set.elements.push_back(element);
+  for (const CellId c : mesh.live_cells()) {
+    const auto element = element_of(mesh, c);
+    (element.curved ? curved : set.elements).push_back(element);
+  }
   set.elements.insert(set.elements.end(), curved.begin(), curved.end());
   for (const FacetId f : mesh.live_facets()) {
     auto& facet = set.facets.emplace_back();

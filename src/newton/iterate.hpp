@@ -7,7 +7,7 @@
 #include <span>
 
 #include "core/timer.hpp"
-#include "newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 
@@ -129,9 +129,10 @@ class Iterate {
     }
     return gradient_round_off_;
   }
-  /// Whether a step promises less than the energy resolves. Round-off costs as much as a gradient. It is asked for where the
-  /// first one, and what forces have done since, leave it open.
+  /// Whether a step promises less than the energy resolves.
   bool is_unresolved(const Step& step) const {
+    // Round-off costs as much as a gradient. It is asked for where the first one, and what forces have done since, leave it
+    // open.
     constexpr double kSafe = 1e4;
     const double decrement = decrement_of(step);
     const bool is_open = value_round_off_at_ == kNone ||

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/timer.hpp"
-#include "newton.hpp"
+#include "newton/newton.hpp"
 
 namespace itr {
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "fem/mass.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/intersection.hpp"
 #include "mesh/connected_parts.hpp"

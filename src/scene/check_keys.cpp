@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <iterator>
 #include <string_view>
 #include <utility>
@@ -24,16 +25,33 @@ constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
     {"gravity", "/boundary_conditions/rhs, which pushes in the negative direction,"},
 };
 
+constexpr std::size_t kTelling = 4;  ///< letters of a key, at least, that others are compared with by parts
+
 /// The shortest of the names that contain the key, as time_steps does for steps.
 std::string longer_name(const std::string& key, const std::vector<std::string>& names) {
-  constexpr std::size_t kTelling = 4;
   std::string found;
   for (const std::string& name : names)
     if (key.size() >= kTelling && name.find(key) != name.npos && (found.empty() || name.size() < found.size())) found = name;
   return found;
 }
 
-[[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::vector<std::string>& names) {
+/// The name whose meaning has the key as a word, as that of scalar_values has von_mises.
+std::string name_by_meaning(const std::string& key, const std::string& pattern, const std::vector<std::string>& names) {
+  const auto is_letter = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; };
+  if (key.size() < kTelling) return "";
+  for (const std::string& name : names) {
+    const Entry* entry = key_table().find(std::string(pattern).append("/").append(name));
+    const std::string_view meaning = entry ? entry->key->meaning : "";
+    for (std::size_t at = meaning.find(key); at != meaning.npos; at = meaning.find(key, at + 1))
+      if (const std::size_t end = at + key.size();
+          (at == 0 || !is_letter(meaning[at - 1])) && (end == meaning.size() || !is_letter(meaning[end])))
+        return name;
+  }
+  return "";
+}
+
+[[noreturn]] void refuse_unknown(const Node& parent, const std::string& key, const std::string& pattern) {
+  const std::vector<std::string> names = key_table().names_below(pattern);
   std::string expected;
   const auto other =
       std::find_if(std::begin(kOtherNames), std::end(kOtherNames), [&](const auto& o) { return o.first == key; });
@@ -45,6 +63,8 @@ std::string longer_name(const std::string& key, const std::vector<std::string>& 
     expected = "\"" + longer + "\" perhaps; ";
   else if (const std::string place = key_table().place_of(key); !place.empty())
     expected = "it at " + place + " perhaps; ";
+  else if (const std::string name = name_by_meaning(key, pattern, names); !name.empty())
+    expected = "\"" + name + "\" perhaps; ";
   expected += "known here:";
   for (const auto& name : names) expected += " " + name;
   parent[key].fail("an unknown key", expected);
@@ -62,7 +82,7 @@ class Checker {
     if (entry && (!children || (!entry->key->kind.empty() && !node.json().is_object()))) return check_value(node, *entry);
     if (!node.json().is_object()) node.fail("an object");
     for (const auto& [key, value] : node.json().items()) {
-      if (!children->contains(key)) refuse_unknown(node, key, key_table().names_below(pattern));
+      if (!children->contains(key)) refuse_unknown(node, key, pattern);
       check(node[key], std::string(pattern).append("/").append(key));
     }
   }

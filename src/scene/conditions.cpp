@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
@@ -90,9 +92,26 @@ class ConditionReader {
     };
   }
 
+  /// Asks about points in time that the run does not come to: a wrong unit of time looks like that.
+  void warn_of_interpolation(const Node& interpolation) {
+    constexpr double kLeastShare = 0.01;
+    const Units& units = interpolation.document().units;
+    for (const Node& factor : interpolation.items()) {
+      const std::vector<double> points = factor["points"].numbers();
+      if (points.size() < 2 || factor["extend"].string("").starts_with("repeat")) continue;
+      const double begin = times().front(), end = times().back();
+      const double shared = std::min(end, points.back()) - std::max(begin, points.front());
+      if (shared < kLeastShare * (points.back() - points.front()))
+        warnings_.push_back(fmt::format("{}: the points go from {} to {}, the run from {} to {}: it hardly meets them",
+                                        factor["points"].pointer(), units.text(points.front(), "s"),
+                                        units.text(points.back(), "s"), units.text(begin, "s"), units.text(end, "s")));
+    }
+  }
+
   void read_dirichlet() {
     Seen seen;
     for (const Node& node : boundary_["dirichlet_boundary"].items()) {
+      warn_of_interpolation(node["interpolation"]);
       warn_of_components(node["value"], Dim, warnings_);
       const Function function = read_value(node);
       warn_of_components(node["dimension"], Dim, warnings_);
@@ -121,6 +140,7 @@ class ConditionReader {
   void read_neumann() {
     Seen seen;
     for (const Node& node : boundary_["neumann_boundary"].items()) {
+      warn_of_interpolation(node["interpolation"]);
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       for (const int tag : loaded_tags(node, seen)) {
@@ -134,6 +154,7 @@ class ConditionReader {
   void read_pressure() {
     Seen seen;
     for (const Node& node : boundary_["pressure_boundary"].items()) {
+      warn_of_interpolation(node["interpolation"]);
       const ScalarFunction<Dim> value = read_scalar_function<Dim>(node["value"], node["interpolation"]);
       const Function as_vector = [f = value.function](const Vec<Dim>& X, double t) {
         return Vec<Dim>::Constant(f(X, t)).eval();
@@ -144,6 +165,17 @@ class ConditionReader {
         load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
       }
     }
+  }
+
+  /// Labels of obstacles, and names that the scene does not ask for.
+  std::string list_obstacles() const {
+    std::string list = obstacle_ids_.empty() ? "" : sets_.surfaces.list(&obstacle_ids_);
+    for (const Node& geometry : geometry_.items())
+      if (const std::string name = geometry["name"].string("");
+          !name.empty() && (geometry["is_obstacle"].boolean(false) || is_flat_obstacle(geometry)) &&
+          sets_.surfaces.of({0, name}).empty())
+        list += (list.empty() ? "\"" : ", \"") + name + "\"";
+    return list.empty() ? "there is none" : list;
   }
 
   /// Warns of obstacles that an entry of `displacements` moves already; two Dirichlet conditions of one id are told of
@@ -167,12 +199,15 @@ class ConditionReader {
   /// The first entry with an obstacle's id moves it; obstacle_displacements come before dirichlet_boundary.
   void read_motions(ObstacleGeometry<Dim>& geometry) {
     std::vector<Node> entries = boundary_["obstacle_displacements"].items();
-    for (const Node& node : entries) warn_of_components(node["value"], Dim, warnings_);
+    for (const Node& node : entries) {
+      warn_of_interpolation(node["interpolation"]);
+      warn_of_components(node["value"], Dim, warnings_);
+    }
     for (const Node& node : entries)
       if (!is_all(node["id"]) && obstacle_of(node["id"]) == kNoTag) {
         if (ids_of(node["id"]).empty())
           node["id"].fail(abbreviate(node["id"].json()) + ", which nothing has",
-                          "an obstacle's id: " + sets_.surfaces.list(&obstacle_ids_));
+                          "an obstacle's surface_selection, or its name: " + list_obstacles());
         warnings_.push_back(
             node["id"].pointer() + ": " + text_of(read_condition_label(node["id"])) +
             " is a surface of a body, which this does not move; obstacles: " + sets_.surfaces.list(&obstacle_ids_));

@@ -412,7 +412,9 @@ Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles&
   for (const Node& geometry : geometries.bodies)
     read_body<Dim>(geometry, files.get(geometry), references, sets, all, warnings);
   for (const Node& geometry : geometries.obstacles)
-    if (const Node id = geometry["surface_selection"]; id.exists()) sets.surfaces.key({read_obstacle_label(id)});
+    if (const auto label = read_obstacle_label(geometry);
+        label && (geometry.has("surface_selection") || references.surfaces.contains(*label)))
+      sets.surfaces.key({*label});
   sets.bodies.choose();
   sets.surfaces.choose();
   for (int& body : all.body) body = sets.bodies.id(body);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 
 #include "itr/setup.hpp"
 #include "mesh/mesh_file.hpp"
@@ -51,8 +52,8 @@ template <int Dim>
 Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles& files, Sets& sets,
                       std::vector<std::string>& warnings);
 
-/// The label of an obstacle: it has one.
-Label read_obstacle_label(const Node& node);
+/// The label of an obstacle: its `surface_selection`, else its name.
+std::optional<Label> read_obstacle_label(const Node& geometry);
 
 template <int Dim>
 struct ObstacleGeometry {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "core/read_file.hpp"
 #include "readers.hpp"
@@ -16,40 +18,50 @@ std::string read_text(const fs::path& file, const std::string& asking_file, cons
   return *std::move(text);
 }
 
-/// The pointer of the first number in valid JSON that no double holds.
-std::string find_overflow(const std::string& text) {
+/// Follows a parser, and refuses a key that an object has twice: only one of the two values would count.
+class ParsedPlace {
+ public:
+  explicit ParsedPlace(std::string file) : file_(std::move(file)) {}
+
+  bool note(Json::parse_event_t event, const Json& parsed) {
+    using Event = Json::parse_event_t;
+    if (event == Event::object_start || event == Event::array_start) {
+      levels_.push_back({event == Event::array_start});
+      return true;
+    }
+    if (event == Event::key) {
+      levels_.back().key = escape_token(parsed.get<std::string>());
+      if (!levels_.back().keys.insert(levels_.back().key).second)
+        throw InputError({file_, pointer(), "the key twice", "it once: one value would be lost"});
+      return true;
+    }
+    if (event != Event::value) levels_.pop_back();
+    if (!levels_.empty()) ++levels_.back().index;
+    return true;
+  }
+
+  std::string pointer() const {
+    std::string pointer;
+    for (const Level& level : levels_) pointer += "/" + (level.is_list ? std::to_string(level.index) : level.key);
+    return pointer.empty() ? "/" : pointer;
+  }
+
+ private:
   struct Level {
     bool is_list;
     std::size_t index = 0;
     std::string key{};
+    std::set<std::string> keys{};
   };
-  std::vector<Level> levels;
-  const auto note = [&](int, Json::parse_event_t event, Json& parsed) {
-    using Event = Json::parse_event_t;
-    if (event == Event::object_start || event == Event::array_start) {
-      levels.push_back({event == Event::array_start});
-      return true;
-    }
-    if (event == Event::key) {
-      levels.back().key = escape_token(parsed.get<std::string>());
-      return true;
-    }
-    if (event != Event::value) levels.pop_back();
-    if (!levels.empty()) ++levels.back().index;
-    return true;
-  };
-  try {
-    (void)Json::parse(text, note);
-  } catch (const Json::exception&) {  // at the number
-  }
-  std::string pointer;
-  for (const Level& level : levels) pointer += "/" + (level.is_list ? std::to_string(level.index) : level.key);
-  return pointer.empty() ? "/" : pointer;
-}
+  std::string file_;
+  std::vector<Level> levels_;
+};
 
 Json parse(const std::string& text, const fs::path& file) {
+  ParsedPlace place(file.string());
   try {
-    Json json = Json::parse(text);
+    Json json =
+        Json::parse(text, [&](int, Json::parse_event_t event, const Json& parsed) { return place.note(event, parsed); });
     if (!json.is_object()) throw InputError({file.string(), "/", abbreviate(json), "an object"});
     return json;
   } catch (const Json::parse_error& error) {
@@ -62,7 +74,7 @@ Json parse(const std::string& text, const fs::path& file) {
     const std::string_view what = error.what();
     const auto first = what.find('\''), last = what.rfind('\'');
     const std::string_view number = first < last ? what.substr(first + 1, last - first - 1) : what;
-    throw InputError({file.string(), find_overflow(text), std::string(number), "a number that a double holds"});
+    throw InputError({file.string(), place.pointer(), std::string(number), "a number that a double holds"});
   }
 }
 

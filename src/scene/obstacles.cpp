@@ -141,8 +141,9 @@ void check_lengths(const Node& mesh, const Surface& surface, const std::vector<V
                 "no degenerate surfaces");
 }
 
-int read_obstacle_id(const Node& node, const Sets& sets) {
-  return node.exists() ? sets.surfaces.of(read_obstacle_label(node)).front() : kNoTag;
+int read_obstacle_id(const Node& geometry, const Sets& sets) {
+  const std::optional<Label> label = read_obstacle_label(geometry);
+  return label && !sets.surfaces.of(*label).empty() ? sets.surfaces.of(*label).front() : kNoTag;
 }
 
 template <int Dim>
@@ -175,7 +176,7 @@ void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets,
   if (extract == 2) surface.triangles.clear();
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();
   check_lengths<Dim>(geometry["mesh"], surface, points);
-  const int id = read_obstacle_id(geometry["surface_selection"], sets);
+  const int id = read_obstacle_id(geometry, sets);
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
 
@@ -217,7 +218,7 @@ void read_flat(const Node& geometry, const Box<Dim>& bodies, const Sets& sets, O
   }
   surface.is_used.assign(points.size(), true);
   out.obstacles.flats.push_back(static_cast<int>(out.obstacles.rest.size()));
-  append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry["surface_selection"], sets), out);
+  append<Dim>(surface, points, Vec<Dim>::Zero(), read_obstacle_id(geometry, sets), out);
 }
 
 }  // namespace
@@ -234,18 +235,24 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
     else
       read_obstacle<Dim>(geometry, files.get(geometry), sets, all);
     all.part.resize(all.obstacles.rest.size(), part);
-    const Node node = geometry["surface_selection"];
-    if (!node.exists()) continue;
-    const auto [first, is_new] = pointers.try_emplace(read_obstacle_label(node), geometry.pointer());
+    const std::optional<Label> label = read_obstacle_label(geometry);
+    if (!label || sets.surfaces.of(*label).empty()) continue;
+    const auto [first, is_new] = pointers.try_emplace(*label, geometry.pointer());
     if (!is_new)
-      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + text_of(first->first) +
+      warnings.push_back(geometry[geometry.has("surface_selection") ? "surface_selection" : "name"].pointer() + ": " +
+                         first->second + " has the id " + text_of(first->first) +
                          " too: what names it acts on both obstacles");
   }
   files.take_notes(warnings);
   return all;
 }
 
-Label read_obstacle_label(const Node& node) {
+std::optional<Label> read_obstacle_label(const Node& geometry) {
+  const Node node = geometry["surface_selection"];
+  if (!node.exists()) {
+    const std::string name = geometry["name"].string("");
+    return name.empty() ? std::nullopt : std::optional(Label{0, name});
+  }
   if (!node.json().is_number() && !node.json().is_string()) node.fail("a number or a name: an obstacle has one id");
   return read_label(node, 0);
 }

@@ -50,7 +50,7 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
     if (time.has(key)) found[key] = time[key].json();
   if (found.size() < 2) time.fail(abbreviate(found), "two of tend, dt and time_steps");
   if (tend.exists() && !(tend.number(0) > options.t0))
-    tend.fail("a time after t0 = " + std::to_string(units.from_si(options.t0, "s")));
+    tend.fail(fmt::format("a time after t0 = {:g}", units.from_si(options.t0, "s")));
   const double duration = tend.number(0) - options.t0;
   options.steps = steps.integer_at_least(1, 1);
   options.dt = dt.exists() ? dt.positive(1) : duration / options.steps;

@@ -98,9 +98,11 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.mesh = read_bodies<Dim>(root, geometries, files, sets, warnings);
   setup.names = {sets.bodies.names(), sets.surfaces.names()};
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list)
+    for (const Node& geometry : *list) {
+      warn_of_radians(geometry["transformation"], warnings);
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings, true);
+    }
   ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, sets, warnings);
   parts = name_parts<Dim>(geometries, obstacles, sets);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);

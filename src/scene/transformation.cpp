@@ -2,6 +2,7 @@
 #include "transformation.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace itr::scene {
@@ -114,6 +115,19 @@ bool transform(std::vector<Vec<Dim>>& points, const Node& geometry) {
   if (!linear.isIdentity(0) || !translation.isZero(0))
     for (Vec<Dim>& point : points) point = linear * point + translation;
   return scale.prod() < 0;
+}
+
+void warn_of_radians(const Node& transformation, std::vector<std::string>& warnings) {
+  constexpr double kPart = std::numbers::pi / 12, kRounding = 1e-4;
+  const Node rotation = transformation["rotation"];
+  const Node mode = transformation["rotation_mode"];
+  if (!rotation.exists() || (mode.exists() && mode.json() == "quaternion")) return;
+  for (const Node& angle : rotation.items()) {
+    const double parts = std::abs(angle.number(0)) / kPart;
+    if (parts < 0.5 || std::abs(parts - std::round(parts)) > kRounding * parts) continue;
+    warnings.push_back(rotation.pointer() + ": " + abbreviate(rotation.json()) + " is a part of pi: are angles in degrees?");
+    return;
+  }
 }
 
 template Box<2> bounding_box(const std::vector<Vec<2>>&);

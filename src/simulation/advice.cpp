@@ -19,6 +19,7 @@
 #include "itr/setup.hpp"
 #include "mesh/connected_parts.hpp"
 #include "simulation/incoming_state.hpp"
+#include "simulation/named.hpp"
 #include "simulation/resolution.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
@@ -103,11 +104,12 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
         if (by > here.by) here = {here.vertices, v, by};
       }
   for (const auto& [ids, here] : all) {
-    const Vec<Dim> place = setup.mesh.rest(here.worst) / setup.units.factor("m");
+    const std::string winner = set_text(setup.names.surfaces, ids.second);
     found.push_back(fmt::format(
         "the Dirichlet conditions of the ids {} and {} contradict each other at {} vertices that both hold, by up to {} at "
-        "({:.4g}): that of {} counts there",
-        ids.first, ids.second, here.vertices, setup.units.text(here.by, "m", 3), fmt::join(place, ", "), ids.second));
+        "{}: that of {} counts there",
+        set_text(setup.names.surfaces, ids.first), winner, here.vertices, setup.units.text(here.by, "m", 3),
+        point_text<Dim>(setup.mesh.rest(here.worst), setup.units, 4), winner));
   }
 }
 
@@ -119,6 +121,7 @@ constexpr double kLargePart = 5;                 ///< of what touches or falls [
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
 constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
+constexpr double kRoundShare = 0.01;             ///< of a body's volume, from which rounds are told of
 constexpr double kGravity[] = {9.7, 9.9};        ///< [m/s^2]
 
 bool is_outside(double value, const double (&range)[2]) { return value < range[0] || value > range[1]; }
@@ -181,12 +184,12 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
   for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
-      found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", body,
+      found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", set_text(setup.names.bodies, body),
                                   setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
     if (has_mass && is_outside(material.density, kUsualDensity))
-      found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?", body,
-                                  setup.units.from_si(material.density, "kg/m^3"), setup.units.name("kg/m^3"),
-                                  setup.units.name("kg/m^3")));
+      found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?",
+                                  set_text(setup.names.bodies, body), setup.units.from_si(material.density, "kg/m^3"),
+                                  setup.units.name("kg/m^3"), setup.units.name("kg/m^3")));
   }
 }
 
@@ -277,7 +280,8 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
         if (!held[Dim * v + c]) free_tags.insert(mesh.facet_tag(f));
   for (const int tag : tags)
     if (!free_tags.contains(tag))
-      found.push_back(fmt::format("a load acts on the surface {}, of which all vertices are held: it moves nothing", tag));
+      found.push_back(fmt::format("a load acts on the surface {}, of which all vertices are held: it moves nothing",
+                                  set_text(setup.names.surfaces, tag)));
 }
 
 template <int Dim>
@@ -286,7 +290,7 @@ void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found)
   const auto [bodies, parts] = find_loose_parts(setup);
   if (parts == 0) return;
   std::string names;
-  for (const int body : bodies) names += (names.empty() ? "" : ", ") + std::to_string(body);
+  for (const int body : bodies) names += (names.empty() ? "" : ", ") + set_text(setup.names.bodies, body);
   const bool has_friction = setup.contact.friction_coefficient > 0 && setup.contact.friction_iterations != 0;
   found.push_back(fmt::format("{} of the bodies' parts have neither inertia nor a held vertex (id {}): {}", parts, names,
                               !setup.contact.enabled ? "nothing keeps them in place"
@@ -301,6 +305,7 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
   constexpr double kIncompressible = 0.485, kSlender = 0.15, kFewLayers = 3;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
+    const std::string name = set_text(setup.names.bodies, body);
     const auto order = setup.order.find(body);
     if (order != setup.order.end() && order->second == 2) continue;
     const double layers = size.thickness / size.mean_edge;
@@ -315,23 +320,23 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
             fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they are "
                         "too stiff until "
                         "remeshing has refined them; compare with quadratic elements (/space/discr_order: 2)",
-                        body, layers));
+                        name, layers));
       if (keeps_volume && material.poisson_ratio >= kIncompressible)
         found.push_back(fmt::format(
             "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
             "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or "
             "with quadratic elements on a fixed mesh (/space/discr_order: 2)",
-            body, material.poisson_ratio));
+            name, material.poisson_ratio));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(
           fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
                       "lock, forces are too large, often several times; {}",
-                      body, material.poisson_ratio, layers, help));
+                      name, material.poisson_ratio, layers, help));
     else if (is_thin)
       found.push_back(
           fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends they "
                       "are too stiff; {}",
-                      body, layers, help));
+                      name, layers, help));
   }
 }
 
@@ -344,6 +349,10 @@ void find_wrong_gravity(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
     found.push_back("bodies fall along " + vector_text<Dim>(a / setup.units.factor("m/s^2")) + " " +
                     setup.units.name("m/s^2") + ": a scene's rhs pushes in the negative direction, gravity down y is [0, " +
                     fmt::format("{:.4g}", setup.units.from_si(9.81, "m/s^2")) + "]");
+  for (const double factor : {1e-6, 1e-3, 1e3, 1e6})  // of millimetres, and of milliseconds
+    if (!is_outside(a.norm() / factor, kGravity))
+      found.push_back(fmt::format("bodies accelerate by {}: is gravity meant, {}?", setup.units.text(a.norm(), "m/s^2"),
+                                  setup.units.text(a.norm() / factor, "m/s^2")));
 }
 
 /// Before a run: what Newton steps of the length where it ends are worth in the stiffest body, against a split.
@@ -384,8 +393,8 @@ void find_near_surfaces(const Simulation<Dim>& simulation, std::vector<std::stri
       found.push_back(fmt::format(
           "d-hat = {} is {:.2g} % of the thickness of body {}, {}: surfaces stand off by up to that, as if what "
           "presses were thicker: forces may be too large by {} percent; /contact/dhat = \"auto\" takes a thousandth",
-          setup.units.text(dhat, "m"), 100 * dhat / size.thickness, body, setup.units.text(size.thickness, "m"),
-          dhat > kLarge * size.thickness ? "tens of" : "some"));
+          setup.units.text(dhat, "m"), 100 * dhat / size.thickness, set_text(setup.names.bodies, body),
+          setup.units.text(size.thickness, "m"), dhat > kLarge * size.thickness ? "tens of" : "some"));
   double shortest = kInfinity;
   const std::vector<Vec<Dim>> rest = setup.proxy ? setup.proxy->rest : state.mesh.rest();
   const CollisionSurface surface = contact_surface(setup, state.mesh).surface;  // of nodes alone
@@ -501,6 +510,12 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));
+  for (const auto& [body, share] : shares_of_rounds(setup.mesh))
+    if (share > kRoundShare)
+      words.push_back(fmt::format(
+          "the facets of body {} are off the rounds that they may stand for by about {:.2g} % of its volume: a finer mesh "
+          "follows rounds, remeshing keeps the facets",
+          set_text(setup.names.bodies, body), 100 * share));
   if (setup.time.has_inertia()) foretell_waves(setup, figures, words);
   return words;
 }

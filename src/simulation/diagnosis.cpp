@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "fem/quadrature.hpp"
+#include "simulation/named.hpp"
 
 namespace itr {
 
@@ -60,7 +61,7 @@ class Diagnosis {
     const std::string limit = limit_of(step, fraction);
     if (!limit.empty()) text_ << "; " << fraction << " of " << which << " Newton step is free, limited " << limit;
   }
-  /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2)"; empty where the step is free.
+  /// "by the vertex-edge pair 3 4 5 near (0.1, 0.2) m"; empty where the step is free.
   std::string limit_of(const VectorX& step, double& fraction) {
     const StepLimit cell = scope_.potential.elastic()->step_limit(x_, step);
     StepLimit pair;
@@ -136,14 +137,12 @@ class Diagnosis {
   std::string text() const { return text_.str(); }
 
  private:
-  /// "12 13 obstacle 4 near (0.1, 0.2)": vertices at `positions`, the cells' (or, of a proxy's surface, "proxy 12").
+  /// "12 13 obstacle 4 near (0.1, 0.2) m": vertices at `positions`, the cells' (or, of a proxy's surface, "proxy 12").
   std::string named(std::span<const int> vertices, const VectorX& positions, const Vec<Dim>& place, const char* own) const {
     const int bodies = static_cast<int>(positions.size() / Dim) - scope_.num_obstacles;
     std::ostringstream text;
     for (const int v : vertices) text << (v < bodies ? own : "obstacle ") << (v < bodies ? v : v - bodies) << ' ';
-    text << "near (";
-    for (int c = 0; c < Dim; ++c) text << (c > 0 ? ", " : "") << place[c];
-    text << ')';
+    text << "near " << point_text<Dim>(place, scope_.units, 6) << ' ' << scope_.units.length();
     return text.str();
   }
   std::string named_cell(std::span<const int> vertices) const {

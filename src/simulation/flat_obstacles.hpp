@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "fem/chords.hpp"
-#include "itr/simulation.hpp"
 #include "simulation/state.hpp"
 
 namespace itr {

@@ -15,24 +15,23 @@
 #include "simulation/closed_faces.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/named.hpp"
 
 namespace itr {
 
 namespace {
 
-template <int Dim>
-std::string describe(const Vec<Dim>& p, const Units& units) {
-  return fmt::format("({:.6g})", fmt::join(Vec<Dim>(p / units.factor("m")), ", "));
-}
+constexpr int kDigits = 6;  ///< of places
 
 /// Where no surfaces cross: what is wholly inside of a body.
 template <int Dim>
 void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   if (setup.proxy) return;
   const auto refuse = [&](const char* what, const Vec<Dim>& p) {
-    throw InputError({"", "initial state",
-                      fmt::format("{} inside of a body, at {} {}", what, describe(p, setup.units), setup.units.length()),
-                      "surfaces that do not touch"});
+    throw InputError(
+        {"", "initial state",
+         fmt::format("{} inside of a body, at {} {}", what, point_text<Dim>(p, setup.units, kDigits), setup.units.length()),
+         "surfaces that do not touch"});
   };
   const VectorX& x = state.history.x[0];
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
@@ -112,11 +111,12 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   const ContactSurface<Dim> contact = contact_surface(setup, state.mesh, state.chords);
   const CollisionSurface& surface = contact.surface;
   const VectorX x = contact.positions(state.history.x[0]);
+  const int bodies = static_cast<int>(x.size() / Dim - setup.obstacles.rest.size());
   const auto corners = [&](const auto& primitive) {
     std::string text;
     for (const int v : primitive)
-      text.append(text.empty() ? "" : "-").append(describe<Dim>(x.segment<Dim>(Dim * v), setup.units));
-    return text;
+      text.append(text.empty() ? "" : "-").append(point_text<Dim>(x.segment<Dim>(Dim * v), setup.units, kDigits));
+    return text + (primitive[0] < bodies ? "" : " of an obstacle");
   };
   constexpr std::size_t kMostNamed = 5;
   const auto pairs = find_intersections<Dim>(surface, x, kMostNamed + 1);
@@ -129,7 +129,8 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   }
   if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
-                    "surfaces that do not touch, but for faces of bodies that coincide at rest"});
+                    "surfaces that do not touch, but for faces of bodies that coincide at rest; parts that are pressed into "
+                    "each other begin apart, and a prescribed motion brings them together"});
 }
 
 template <int Dim>

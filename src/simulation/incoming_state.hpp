@@ -3,7 +3,7 @@
 #pragma once
 
 #include "itr/setup.hpp"
-#include "itr/simulation.hpp"
+#include "simulation/state.hpp"
 #include "simulation/step.hpp"
 #include "simulation/step_problem.hpp"
 

@@ -22,6 +22,7 @@
 #include "held_turn.hpp"
 #include "itr/core.hpp"
 #include "itr/types.hpp"
+#include "named.hpp"
 #include "newton/corrected_system.hpp"
 #include "simulation/step_problem.hpp"
 
@@ -72,11 +73,10 @@ class FlightGuard {
           "can "
           "carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
           kFarthest);
-    const Vec<Dim> place = start_.template segment<Dim>(Dim * flown_->nodes.front()) / units.factor("m");
     return fmt::format(
-        "loads push a body that its conditions do not hold, the one at ({:.3g}), and nothing comes in its way: there is no "
+        "loads push a body that its conditions do not hold, the one at {}, and nothing comes in its way: there is no "
         "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
-        fmt::join(place, ", "));
+        point_text<Dim>(start_.template segment<Dim>(Dim * flown_->nodes.front()), units, 3));
   }
 
  private:

@@ -12,11 +12,11 @@
 #include "energy/inertia.hpp"
 #include "geometry/bvh.hpp"
 #include "itr/energy.hpp"
-#include "itr/simulation.hpp"
 #include "itr/transfer.hpp"
 #include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/moment.hpp"
+#include "simulation/state.hpp"
 #include "time/integrator.hpp"
 
 namespace itr {

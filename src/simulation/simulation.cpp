@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "core/process.hpp"
-#include "geometry/rotation.hpp"
 #include "incoming_state.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
@@ -20,106 +19,11 @@
 #include "simulation/step.hpp"
 #include "simulation/step_problem.hpp"
 #include "unsupported.hpp"
+#include "watch.hpp"
 
 namespace itr {
 
 namespace {
-
-constexpr double kMostRotation = 5;        ///< of linear elasticity [degrees]: strains are off by 4e-3 there
-constexpr double kForceError = 0.01;       ///< relative, from which it is said
-constexpr int kLooseSteps = 3;             ///< in a row
-constexpr double kNoStrain = 1e-6;         ///< below it the energy of bodies is taken for none
-constexpr double kResidualFraction = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
-
-/// Energy of the bodies by the square of a strain that is everywhere, sum(E V) [J].
-template <int Dim>
-double stiffness(const Setup<Dim>& setup) {
-  double sum = 0;
-  for (const CellId c : setup.mesh.live_cells())
-    sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
-  return sum;
-}
-
-/// Warns of the end of a step against the model or its tolerances, of each once.
-template <int Dim>
-class Watch {
- public:
-  void look(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const NodalForces& forces,
-            const Logger& logger) {
-    if (!has_said_rotation_) find_rotation(setup, state, logger);
-    if (!has_said_remeshing_) find_starved_remeshing(setup, report, logger);
-    if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
-    if (!has_said_reactions_) find_unbalanced_reactions(setup, report, forces, logger);
-  }
-
- private:
-  void find_rotation(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger) {
-    const auto is_linear = [](const auto& entry) { return entry.second.law == MaterialLaw::linear; };
-    if (std::none_of(setup.materials.begin(), setup.materials.end(), is_linear)) return;
-    const Mesh<Dim>& mesh = state.mesh;
-    double most = 0;
-    int body = 0;
-    for (const CellId c : mesh.live_cells()) {
-      if (setup.materials.at(mesh.body(c)).law != MaterialLaw::linear) continue;
-      const auto element = element_of(mesh, c);
-      const double angle = rotation_angle(deformation_gradient<Dim>(element, state.history.x[0]));
-      if (angle > most) most = angle, body = mesh.body(c);
-    }
-    if (most <= kMostRotation) return;
-    has_said_rotation_ = true;
-    logger.warning(
-        fmt::format("step {}: body {} is linear elastic and turns by {:.3g} degrees: rotations stretch it; NeoHookean or "
-                    "SaintVenant do not mind them",
-                    state.step, body, most));
-  }
-  void find_starved_remeshing(const Setup<Dim>& setup, const StepReport& report, const Logger& logger) {
-    if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled) return;
-    if (!(report.residual_worth > kResidualFraction * report.split_tolerance)) return;
-    has_said_remeshing_ = true;
-    logger.warning(fmt::format(
-        "step {}: Newton ended where one more iteration would gain {}, and a split is made for {}: "
-        "refinement sees the residual, not the solution; a smaller /solver/nonlinear/x_delta, or none of these "
-        "tolerances",
-        report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(report.split_tolerance, "J", 2)));
-  }
-  /// A residual that is worth a part e of the energy stands for forces off by about sqrt(e). A first touch is passed over,
-  /// and energies that are nothing beside those of strains of a millionth.
-  void find_loose_forces(const Setup<Dim>& setup, const State<Dim>& state, const StepReport& report, const Logger& logger) {
-    const double energy = std::max(state.stored_energy, report.energy.inertia);
-    const double error = std::sqrt(report.residual_worth / energy);
-    loose_steps_ = energy > kNoStrain * kNoStrain * stiffness(setup) && error > kForceError ? loose_steps_ + 1 : 0;
-    if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
-    has_said_forces_ = true;
-    logger.warning(fmt::format(
-        "step {}: Newton ended where one more iteration would gain {} of {}: forces may be off by about "
-        "{:.2g} %; a smaller /solver/nonlinear/x_delta, or none of these tolerances",
-        report.step, setup.units.text(report.residual_worth, "J", 2), setup.units.text(energy, "J", 2), 100 * error));
-  }
-
-  /// Reactions are off by what the balance of forces lacks at free vertices.
-  void find_unbalanced_reactions(const Setup<Dim>& setup, const StepReport& report, const NodalForces& forces,
-                                 const Logger& logger) {
-    const auto largest = [](const VectorX& force) {
-      return force.size() > 0 ? std::sqrt(force.reshaped(Dim, force.size() / Dim).colwise().squaredNorm().maxCoeff()) : 0;
-    };
-    largest_reaction_ = std::max(largest_reaction_, largest(forces.reaction));
-    const double left = largest(forces.residual);
-    unbalanced_steps_ = left > kForceError * largest_reaction_ && largest_reaction_ > 0 ? unbalanced_steps_ + 1 : 0;
-    if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && report.step >= setup.time.steps)) return;
-    has_said_reactions_ = true;
-    logger.warning(fmt::format(
-        "step {}: {} are left of the balance of forces at a vertex, {:.2g} % of the largest reaction: reactions may be off "
-        "by "
-        "as much; over steps of {} positions may have too few digits for accelerations, which a longer /time/dt mends, or a "
-        "tolerance is too large",
-        report.step, setup.units.text(left, "N", 2), 100 * left / largest_reaction_,
-        setup.units.text(setup.time.dt, "s", 3)));
-  }
-
-  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false, has_said_reactions_ = false;
-  int loose_steps_ = 0, unbalanced_steps_ = 0;  ///< in a row
-  double largest_reaction_ = 0;                 ///< at a vertex, so far [N]
-};
 
 /// Where a simulation is when it calls the program.
 enum class Phase { between_steps, in_step, after_mesh_change };

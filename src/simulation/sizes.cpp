@@ -4,7 +4,9 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 namespace itr {
 
@@ -53,6 +55,44 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
   return sizes;
 }
 
+template <int Dim>
+std::map<int, double> shares_of_rounds(const Mesh<Dim>& mesh) {
+  constexpr double kLargestTurn = 1.05;  // 60 degrees
+  std::map<std::array<int, Dim - 1>, std::vector<FacetId>> corners;
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    if (!mesh.is_facet_alive(f)) continue;
+    for (int left_out = 0; left_out < Dim; ++left_out) {
+      std::array<int, Dim - 1> corner;
+      for (int i = 0; i < Dim - 1; ++i) corner[i] = mesh.facet(f)[(left_out + 1 + i) % Dim];
+      std::sort(corner.begin(), corner.end());
+      corners[corner].push_back(f);
+    }
+  }
+  // In 2D along the facet, which turns as the normal does; its length is twice the area in 3D.
+  const auto normal_of = [&](FacetId f) -> Vec<Dim> {
+    const auto& facet = mesh.facet(f);
+    const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
+    if constexpr (Dim == 2)
+      return a;
+    else
+      return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0])));
+  };
+  std::map<int, double> lost;
+  for (const auto& [corner, facets] : corners) {
+    if (facets.size() != 2) continue;
+    const Vec<Dim> a = normal_of(facets[0]), b = normal_of(facets[1]);
+    const double turn = std::acos(std::clamp(a.dot(b) / (a.norm() * b.norm()), -1.0, 1.0));
+    if (turn > kLargestTurn) continue;
+    const double length = Dim == 2 ? 1 : (mesh.rest(corner.front()) - mesh.rest(corner.back())).norm();
+    const double height = (a.norm() + b.norm()) / 2 / length;  // of the facets above the corner
+    lost[body_at<Dim>(mesh, mesh.facet(facets[0]))] += length * height * height * turn / 12;
+  }
+  for (const auto& [body, size] : body_sizes(mesh)) lost[body] /= size.volume;
+  return lost;
+}
+
+template std::map<int, double> shares_of_rounds(const Mesh<2>&);
+template std::map<int, double> shares_of_rounds(const Mesh<3>&);
 template double facet_measure(const Mesh<2>&, FacetId);
 template double facet_measure(const Mesh<3>&, FacetId);
 template std::map<int, BodySize> body_sizes(const Mesh<2>&);

@@ -37,9 +37,10 @@ from harness import stored  # noqa: E402
 TIME_LIMIT = 120  # seconds of a run, after which it counts as stopped
 VERDICTS = ("right", "said", "wrong without a word", "stopped")
 # Advice before the first step speaks of scenes, not of a result that is off.
-ADVICE = ("bodies span", "is unusual", "thin, with about", "nu = ", "bodies fall along", "at the start is below", "d-hat = ",
-          "every vertex is held", "a load acts on the surface", "slivers", "have neither inertia nor a held vertex",
-          "stiffness ratio", "edges differ in length", "see above", "Newton iterations", "takes its place")
+ADVICE = ("bodies span", "is unusual", "thin, with about", "nu = ", "bodies fall along", "is gravity meant",
+          "at the start is below", "d-hat = ", "every vertex is held", "a load acts on the surface", "slivers",
+          "have neither inertia nor a held vertex", "stiffness ratio", "edges differ in length", "see above",
+          "Newton iterations", "takes its place")
 
 
 @dataclasses.dataclass

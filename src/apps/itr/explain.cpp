@@ -17,6 +17,7 @@
 #include "mesh/rest_box.hpp"
 #include "simulation/advice.hpp"
 #include "simulation/barrier_stiffness.hpp"
+#include "simulation/named.hpp"
 #include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
 
@@ -115,7 +116,9 @@ class Explanation {
     for (const auto& [id, sum] : sums) {
       const Material& material = setup_.materials.at(id);
       const auto order = setup_.order.find(id);
-      fmt::print("  id {}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id, sum.cells,
+      const std::string name = set_text(setup_.names.bodies, id);
+      fmt::print("  id {}{}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id,
+                 name == std::to_string(id) ? "" : " (" + name + ")", sum.cells,
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
                  units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,

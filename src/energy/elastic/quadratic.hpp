@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "core/parallel_reduce.hpp"
-#include "elastic.hpp"
 #include "energy/elastic/elastic.hpp"
 #include "energy/elastic/laws.hpp"
+#include "energy/elastic/neo_hookean.hpp"
 #include "energy/energy.hpp"
 #include "energy/project_block.hpp"
 #include "energy/step_limit.hpp"
@@ -22,8 +22,6 @@
 #include "geometry/quadratic_validity.hpp"
 #include "itr/types.hpp"
 #include "jacobian_barrier.hpp"
-#include "laws.hpp"
-#include "neo_hookean.hpp"
 
 namespace itr {
 
