@@ -48,7 +48,7 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
   /// Shares of dx by vertex, from planar bounds of each pair (`planar_shares`); of its first part where it is walked in
   /// parts.
-  bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView ways, Workspace& workspace) const override;
+  bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
   /// The pairs that block a step along dx before `fraction` of it; in its first part where it is walked in parts.
   bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
