@@ -94,14 +94,14 @@ class ConditionReader {
 
   /// Asks about points in time that the run does not come to: a wrong unit of time looks like that.
   void warn_of_interpolation(const Node& interpolation) {
-    constexpr double kLeastShare = 0.01;
+    constexpr double kLeastFraction = 0.01;
     const Units& units = interpolation.document().units;
     for (const Node& factor : interpolation.items()) {
       const std::vector<double> points = factor["points"].numbers();
       if (points.size() < 2 || factor["extend"].string("").starts_with("repeat")) continue;
       const double begin = times().front(), end = times().back();
       const double shared = std::min(end, points.back()) - std::max(begin, points.front());
-      if (shared < kLeastShare * (points.back() - points.front()))
+      if (shared < kLeastFraction * (points.back() - points.front()))
         warnings_.push_back(fmt::format("{}: the points go from {} to {}, the run from {} to {}: it hardly meets them",
                                         factor["points"].pointer(), units.text(points.front(), "s"),
                                         units.text(points.back(), "s"), units.text(begin, "s"), units.text(end, "s")));

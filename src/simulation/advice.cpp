@@ -121,7 +121,7 @@ constexpr double kLargePart = 5;                 ///< of what touches or falls [
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
 constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
-constexpr double kRoundShare = 0.01;             ///< of a body's volume, from which rounds are told of
+constexpr double kRoundFraction = 0.01;          ///< of a body's volume, from which rounds are told of
 constexpr double kGravity[] = {9.7, 9.9};        ///< [m/s^2]
 
 bool is_outside(double value, const double (&range)[2]) { return value < range[0] || value > range[1]; }
@@ -510,12 +510,12 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));
-  for (const auto& [body, share] : shares_of_rounds(setup.mesh))
-    if (share > kRoundShare)
+  for (const auto& [body, fraction] : fractions_of_rounds(setup.mesh))
+    if (fraction > kRoundFraction)
       words.push_back(fmt::format(
           "the facets of body {} are off the rounds that they may stand for by about {:.2g} % of its volume: a finer mesh "
           "follows rounds, remeshing keeps the facets",
-          set_text(setup.names.bodies, body), 100 * share));
+          set_text(setup.names.bodies, body), 100 * fraction));
   if (setup.time.has_inertia()) foretell_waves(setup, figures, words);
   return words;
 }

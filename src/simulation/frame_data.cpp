@@ -147,7 +147,7 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   const auto add_density = [&](const auto& element, auto points) {
     const Material& material = setup.materials.at(element.body);
     double mean = 0;
-    for (const auto& [F, X, share] : points) mean += share * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    for (const auto& [F, X, fraction] : points) mean += fraction * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
     if (element.curved)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
                                    elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));

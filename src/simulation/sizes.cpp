@@ -56,7 +56,7 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
-std::map<int, double> shares_of_rounds(const Mesh<Dim>& mesh) {
+std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
   constexpr double kLargestTurn = 1.05;  // 60 degrees
   std::map<std::array<int, Dim - 1>, std::vector<FacetId>> corners;
   for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
@@ -91,8 +91,8 @@ std::map<int, double> shares_of_rounds(const Mesh<Dim>& mesh) {
   return lost;
 }
 
-template std::map<int, double> shares_of_rounds(const Mesh<2>&);
-template std::map<int, double> shares_of_rounds(const Mesh<3>&);
+template std::map<int, double> fractions_of_rounds(const Mesh<2>&);
+template std::map<int, double> fractions_of_rounds(const Mesh<3>&);
 template double facet_measure(const Mesh<2>&, FacetId);
 template double facet_measure(const Mesh<3>&, FacetId);
 template std::map<int, BodySize> body_sizes(const Mesh<2>&);

@@ -23,9 +23,9 @@ double facet_measure(const Mesh<Dim>& mesh, FacetId f);
 template <int Dim>
 std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh);
 
-/// The volume between the boundary and rounds that its corners may stand for, as a share of the volume, by body. A corner of
-/// more than 60 degrees is one. Exact to the order of the corners for circles and spheres of regular facets.
+/// The volume between the boundary and rounds that its corners may stand for, as a fraction of the volume, by body. A corner
+/// of more than 60 degrees is one. Exact to the order of the corners for circles and spheres of regular facets.
 template <int Dim>
-std::map<int, double> shares_of_rounds(const Mesh<Dim>& mesh);
+std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh);
 
 }  // namespace itr
