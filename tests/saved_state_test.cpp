@@ -12,6 +12,7 @@
 #include "itr/output.hpp"
 #include "itr/scene.hpp"
 #include "output/certify.hpp"
+#include "simulation/state.hpp"
 
 namespace itr::output {
 namespace {
