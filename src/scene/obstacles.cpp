@@ -226,7 +226,6 @@ template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
                                      const Sets& sets, std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
-  std::map<Label, std::string> pointers;
   for (const Node& geometry : geometries.obstacles) {
     const int part = all.part.empty() ? 0 : all.part.back() + 1;
     if (is_flat_obstacle(geometry))
@@ -234,12 +233,6 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
     else
       read_obstacle<Dim>(geometry, files.get(geometry), sets, all);
     all.part.resize(all.obstacles.rest.size(), part);
-    const Node node = geometry["surface_selection"];
-    if (!node.exists()) continue;
-    const auto [first, is_new] = pointers.try_emplace(read_obstacle_label(node), geometry.pointer());
-    if (!is_new)
-      warnings.push_back(node.pointer() + ": " + first->second + " has the id " + text_of(first->first) +
-                         " too: what names it acts on both obstacles");
   }
   files.take_notes(warnings);
   return all;

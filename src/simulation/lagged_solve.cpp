@@ -14,6 +14,7 @@
 #include "held_turn.hpp"
 #include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
+#include "newton/norms.hpp"
 
 namespace itr {
 
@@ -25,6 +26,8 @@ constexpr int kMostRounds = 1000;              ///< where no number limits them
 constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
+constexpr double kLooseForce = 1e-2;           ///< of the forces that act: to which the first round is solved
+constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
 }  // namespace
 
@@ -105,7 +108,7 @@ NewtonSummary LaggedSolve<Dim>::minimize_first(VectorX& x, VectorX way_to_start)
     summary.add_effort(all);
     all = std::move(summary);
     if (!is_outdated) return all;
-    lagged_.friction = potential_.lag_friction(x, workspace_);
+    potential_.lag_friction(x, workspace_, lagged_);
   }
 }
 
@@ -141,6 +144,7 @@ NewtonSummary LaggedSolve<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
       return changed;
     };
   }
+  if (setup_.lagging_tolerance > 0 && lagged_.friction) follow_friction(d, extras);
   enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
   std::optional<FlightGuard<Dim>> guard;
   if (!terms_.has_inertia)
@@ -159,8 +163,12 @@ NewtonSummary LaggedSolve<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
     return least_motion_->rigid_motions(base_ + iterate, dofs);
   });
   NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.system();
-  NewtonSummary summary =
-      minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
+  NewtonOptions options = setup_.newton;
+  if (loose_force_ > 0) {
+    options.force_tolerance = std::max(options.force_tolerance, loose_force_);
+    extras.must_be_minimum = false;
+  }
+  NewtonSummary summary = minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
   x = base_ + d;
   for (Eigen::Index i = 0; i < x.size(); ++i)
     if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
@@ -174,6 +182,20 @@ NewtonSummary LaggedSolve<Dim>::minimize_from(VectorX& x, const EnergySum& sum, 
     return summary;
   }
   return explained(std::move(summary), sum, x);
+}
+
+/// Lets a solve from the increment d be primal-dual in friction.
+template <int Dim>
+void LaggedSolve<Dim>::follow_friction(const VectorX& d, NewtonExtras& extras) {
+  lagged_.friction_of_surface->begin_solve(potential_.on_surface(base_ + d), problem_.rounds_ > 0);
+  extras.on_iteration = [&, before = extras.on_iteration, weights = extras.norm_weights,
+                         last = VectorX(d)](const NewtonProgress& progress) mutable {
+    const double way = Norms(dofs_, setup_.newton.norm, weights).of_step(d - last);
+    const double share = progress.step_norm > 0 ? std::min(1.0, way / progress.step_norm) : 1;
+    lagged_.friction_of_surface->follow(potential_.on_surface(base_ + d), share);
+    last = d;
+    return !before || before(progress);
+  };
 }
 
 template <int Dim>
@@ -229,6 +251,21 @@ double LaggedSolve<Dim>::largest_change(const VectorX& x, const Lagged& now) {
     size = std::max(size, setup_.contact.friction_coefficient *
                               largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
   return size > 0 ? largest(after - before) / size : 0;
+}
+
+/// Lagged forces on unknowns at x, `now` less those of `lagged_`, scaled.
+template <int Dim>
+VectorX LaggedSolve<Dim>::residual_of_lagging(const VectorX& x, const Lagged& now) {
+  const auto is_lagged = [](const Traits& term) { return term.needs_velocities || term.has_no_potential; };
+  return forces_of(x, now, is_lagged) - forces_of(x, lagged_, is_lagged);
+}
+
+/// Forces to which to solve a round, as NewtonOptions::force_tolerance, after one that changed lagged ones by `change`: as
+/// inexact Newton methods do (Dembo, Eisenstat & Steihaug 1982). 0: as exactly as the last round.
+template <int Dim>
+double LaggedSolve<Dim>::asked_of_round(double change) const {
+  const bool may_be_loose = setup_.lagging_tolerance > 0 && potential_.has_friction() && most_rounds() > 1;
+  return may_be_loose && change > setup_.lagging_tolerance ? std::min(kLooseForce, kLooseByChange * change) : 0;
 }
 
 /// By which share of themselves, of the larger, terms of which `is_asked(traits)` holds change from `lagged_` to `now`, in
@@ -302,6 +339,14 @@ bool LaggedSolve<Dim>::is_better_start(const VectorX& start, const VectorX& x) {
          sum.value(start, workspace_) < sum.value(with_held_at_targets(x), workspace_);
 }
 
+/// Norm over the unknowns of what x leaves of the forces, with `lagged` terms.
+template <int Dim>
+double LaggedSolve<Dim>::residual_with(const VectorX& x, const Lagged& lagged) {
+  VectorX gradient = VectorX::Zero(x.size());
+  EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+  return Norms(dofs_, NewtonNorm::euclidean, {}).of_gradient(gradient);
+}
+
 template <int Dim>
 NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const VectorX& expected) {
   double lagging_seconds = 0;
@@ -323,6 +368,8 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
       x = start;
     }
   }
+  problem_.rounds_ = 0;
+  loose_force_ = asked_of_round(1);
   NewtonSummary summary = minimize_first(x, std::move(way_to_start));
   problem_.rounds_ = 1;
   summary.assembly_seconds += lagging_seconds;
@@ -336,26 +383,38 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
   int best_round = 0, round = 1;
   RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
   std::optional<Lagged> now;  // what is lagged at x, where the last round made it
+  Relaxation relaxation;
+  const auto solve_again = [&] {
+    NewtonSummary next = minimize_lagged(x);
+    ++problem_.rounds_;
+    const bool is_fixed_point = next.converged() && next.iterations == 0 && loose_force_ == 0;
+    next.add_effort(summary);
+    summary = std::move(next);
+    return is_fixed_point;
+  };
   for (; summary.converged() && round < rounds; ++round) {
     Lagged next_lagged;
-    VectorX gradient = VectorX::Zero(x.size());
+    double residual, factor = 1;
+    bool is_settled;
     {
       const ScopedTimer timer(summary.assembly_seconds);
       problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
       next_lagged = potential_.lag(x, workspace_);
-      EnergyOfIncrement(potential_.sum(next_lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+      if (setup_.lagging_tolerance > 0) {
+        residual = largest_change(x, next_lagged);
+        is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0;
+        if (lagged_.friction && next_lagged.friction) factor = relaxation.factor(residual_of_lagging(x, next_lagged));
+      } else {
+        residual = residual_with(x, next_lagged);
+        is_settled = potential_.has_friction() && residual <= tolerance;
+      }
     }
-    double norm = 0;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] != kNone) norm += gradient[i] * gradient[i];
-    norm = std::sqrt(norm);
-    if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
-                                     : potential_.has_friction() && norm <= tolerance) {
+    if (is_settled) {
       end = RoundsEnd::asked;
       break;
     }
-    if (norm < least) {
-      least = norm;
+    if (residual < least) {
+      least = residual;
       best = x;
       best_lagged = lagged_;
       best_stiffness = stiffness_;
@@ -368,22 +427,21 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
         potential_.contact()->set_stiffness(stiffness_.value);
       }
       end = RoundsEnd::stalled;
+      if (std::exchange(loose_force_, 0) > 0) solve_again();
       break;
     }
-    if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal)) {
+    if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal);
+        recurred && loose_force_ == 0) {
       end = *recurred;
       now = std::move(next_lagged);
       break;
     }
     if (previous.size() == kLongestCycle) previous.erase(previous.begin());
     previous.push_back(x);
+    if (factor != 1) next_lagged.friction_of_surface->relax(*lagged_.friction_of_surface, factor);
     lagged_ = std::move(next_lagged);
-    NewtonSummary next = minimize_lagged(x);
-    ++problem_.rounds_;
-    const bool is_fixed_point = next.converged() && next.iterations == 0;
-    next.add_effort(summary);
-    summary = next;
-    if (is_fixed_point) {
+    loose_force_ = round + 1 < rounds ? asked_of_round(residual) : 0;
+    if (solve_again()) {
       end = RoundsEnd::settled;
       break;
     }

@@ -39,10 +39,15 @@ class LaggedSolve {
   template <typename F>
   double change_of(const VectorX& x, const Lagged& now, const F& is_asked);
   double largest_change(const VectorX& x, const Lagged& now);
+  double asked_of_round(double change) const;
+  double residual_with(const VectorX& x, const Lagged& lagged);
+  VectorX residual_of_lagging(const VectorX& x, const Lagged& now);
+  void follow_friction(const VectorX& x, NewtonExtras& extras);
   void judge_lagging(const VectorX& x, std::optional<Lagged> now, const char* how, int rounds, NewtonSummary& summary);
 
   StepProblem<Dim>& problem_;
   bool must_settle_;
+  double loose_force_ = 0;  ///< of the forces that act: to which a round is solved that is not the last; 0: as the last
   const StepSetup<Dim>& setup_ = problem_.setup_;
   const PotentialTerms<Dim>& terms_ = problem_.terms_;
   const CellSet<Dim>& cells_ = problem_.cells_;

@@ -2,13 +2,15 @@
 #include "lagging_rounds.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace itr {
 
 namespace {
 
 constexpr double kFixedPoint = 1e-12;  ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
-constexpr double kSameState = 1e-3;    ///< of a solve's step tolerance: states nearer than that are one
+constexpr double kLeastFactor = 0.1, kLargestFactor = 4;
+constexpr double kSameState = 1e-3;  ///< of a solve's step tolerance: states nearer than that are one
 
 }  // namespace
 
@@ -23,6 +25,16 @@ const char* to_string(RoundsEnd end) {
     default:
       return "";
   }
+}
+
+double Relaxation::factor(VectorX residual) {
+  if (last_.size() > 0) {
+    const VectorX change = residual - last_;
+    if (const double squared = change.squaredNorm(); squared > 0)
+      factor_ = std::clamp(-factor_ * last_.dot(change) / squared, kLeastFactor, kLargestFactor);
+  }
+  last_ = std::move(residual);
+  return factor_;
 }
 
 std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,

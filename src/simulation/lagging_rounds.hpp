@@ -19,6 +19,17 @@ enum class RoundsEnd {
 
 const char* to_string(RoundsEnd end);
 
+/// Aitken's factor for the relaxation of rounds: how far to go along what a round would change (Küttler & Wall 2008).
+class Relaxation {
+ public:
+  /// The factor after a round that leaves lagged forces off by `residual` [N].
+  double factor(VectorX residual);
+
+ private:
+  VectorX last_;  ///< residual
+  double factor_ = 1;
+};
+
 /// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
 /// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
 std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
