@@ -27,6 +27,8 @@ constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: le
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kLooseForce = 1e-2;           ///< of the forces that act: to which the first round is solved
+constexpr int kLooseRounds = 4;                ///< at most: what goes on for longer may do so because rounds are not exact
+constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
 }  // namespace
@@ -89,13 +91,14 @@ NewtonSummary LaggedSolve<Dim>::minimize_lagged(VectorX& x, VectorX way_to_start
 
 /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will hold
 /// them, and slide off before the next round unless friction is lagged where contact forces are new: here it is lagged
-/// again as often as those on a body double or halve on the way.
+/// again as often as those on a body double or halve on the way, or become four times or a quarter where later rounds settle
+/// what is lagged.
 template <int Dim>
 NewtonSummary LaggedSolve<Dim>::minimize_first(VectorX& x, VectorX way_to_start) {
   constexpr int kMostLags = 200;
-  constexpr double kChange = 2;
+  const double change = setup_.lagging_tolerance > 0 ? 4 : 2;
   NewtonSummary all;
-  const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
+  const auto is_near = [change](double a, double b) { return a <= change * b && b <= change * a; };
   for (int lags = least_motion_ && potential_.has_friction() ? kMostLags : 0;; --lags) {
     bool is_outdated = false;
     std::function<bool(const VectorX&)> ends_at;
@@ -403,7 +406,8 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
       if (setup_.lagging_tolerance > 0) {
         residual = largest_change(x, next_lagged);
         is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0;
-        if (lagged_.friction && next_lagged.friction) factor = relaxation.factor(residual_of_lagging(x, next_lagged));
+        if (round > kPlainRounds && lagged_.friction && next_lagged.friction)
+          factor = relaxation.factor(residual_of_lagging(x, next_lagged));
       } else {
         residual = residual_with(x, next_lagged);
         is_settled = potential_.has_friction() && residual <= tolerance;
@@ -440,7 +444,7 @@ NewtonSummary LaggedSolve<Dim>::solve(VectorX& x, const VectorX& lagged_x, const
     previous.push_back(x);
     if (factor != 1) next_lagged.friction_of_surface->relax(*lagged_.friction_of_surface, factor);
     lagged_ = std::move(next_lagged);
-    loose_force_ = round + 1 < rounds ? asked_of_round(residual) : 0;
+    loose_force_ = round < std::min(kLooseRounds, rounds - 1) ? asked_of_round(residual) : 0;
     if (solve_again()) {
       end = RoundsEnd::settled;
       break;

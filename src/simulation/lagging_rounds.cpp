@@ -9,7 +9,8 @@ namespace itr {
 namespace {
 
 constexpr double kFixedPoint = 1e-12;  ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
-constexpr double kLeastFactor = 0.1, kLargestFactor = 4;
+constexpr double kLeastFactor = 0.25, kLargestFactor = 4;
+constexpr double kFast = 0.5;        ///< of the residual before: rounds that come to less need no relaxation
 constexpr double kSameState = 1e-3;  ///< of a solve's step tolerance: states nearer than that are one
 
 }  // namespace
@@ -30,8 +31,10 @@ const char* to_string(RoundsEnd end) {
 double Relaxation::factor(VectorX residual) {
   if (last_.size() > 0) {
     const VectorX change = residual - last_;
-    if (const double squared = change.squaredNorm(); squared > 0)
-      factor_ = std::clamp(-factor_ * last_.dot(change) / squared, kLeastFactor, kLargestFactor);
+    const double squared = change.squaredNorm();
+    const double aitken = squared > 0 ? -factor_ * last_.dot(change) / squared : 1;
+    const bool is_fast = residual.norm() < kFast * last_.norm();
+    factor_ = is_fast || aitken <= 0 ? 1 : std::clamp(aitken, kLeastFactor, kLargestFactor);
   }
   last_ = std::move(residual);
   return factor_;

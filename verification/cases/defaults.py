@@ -12,7 +12,7 @@ from harness.scenes import box_mesh, write_mesh
 from harness.suite import Result, compare
 
 TITLE = "Forces by defaults"
-QUANTITY = "largest force, ratio of forces or speed, of scenes without a key of method; Newton iterations"
+QUANTITY = "force, or ratio of forces, of scenes without a key of method; Newton iterations"
 REFERENCE = "the same scene refined twice, with a third of d-hat, in millimetres and in a tenth and ten times its time; the fewest iterations by hand"
 TOLERANCE = "3 %; 0.5 % in other units; twice the iterations"
 NEEDS = ("numpy", "meshio")
@@ -49,20 +49,6 @@ def o_ring(context):
             "time": {"dt": 0.1, "tend": 1, "quasistatic": True},
             "contact": {"enabled": True, "friction_coefficient": 0.3},
             "output": {"forces": [{"name": "force", "obstacles": 2}]}}, lambda rows: abs(rows[-1]["all_y"])
-
-
-def hook(context):
-    """A beam with a nose that is pushed over a bump."""
-    points, cells = box_mesh([40, 4], [0.02, 0.002])
-    points[:, 1] -= 0.0015 * np.maximum(0, 1 - abs(points[:, 0] - 0.018) / 0.002) * (1 - points[:, 1] / 0.002)
-    write_mesh(context.folder / "hook.msh", points, cells)
-    bump = [(0.0205, -0.003), (0.0225, -0.0005), (0.0245, -0.003)]
-    return {"geometry": [body("hook.msh"), obstacle(context, "bump.obj", bump, [(1, 2), (2, 3)])],
-            "materials": [{"id": 1, "type": "NeoHookean", "E": 2e9, "nu": 0.35, "rho": 1000}],
-            "boundary_conditions": {"dirichlet_boundary": [{"id": 1, "value": ["0.006 * t", 0]}]},
-            "time": {"dt": 0.025, "tend": 1, "quasistatic": True},
-            "contact": {"enabled": True, "friction_coefficient": 0.3},
-            "output": {"forces": [{"name": "force", "bodies": 1}]}}, lambda rows: max(row["reaction_x"] for row in rows)
 
 
 def press_fit(context):
@@ -106,7 +92,7 @@ def thin_wall(context):
             "output": {"forces": [{"name": "force", "surfaces": 5}]}}, lambda rows: abs(rows[-1]["all_z"])
 
 
-SCENES = [o_ring, hook, press_fit, plates, thin_wall]
+SCENES = [o_ring, press_fit, plates, thin_wall]
 
 
 def refined(scene, levels):
@@ -180,7 +166,7 @@ def variants(context, scene):
 
 
 def thickness(scene):
-    return {"ring.msh": 0.003, "hook.msh": 0.002, "block.msh": 0.01, "plate.msh": 0.02,
+    return {"ring.msh": 0.003, "block.msh": 0.01, "plate.msh": 0.02,
             "wall.msh": 0.001}[next(entry["mesh"] for entry in scene["geometry"] if not entry.get("is_obstacle"))]
 
 
