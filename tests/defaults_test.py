@@ -167,6 +167,20 @@ class Sets(Case):
         self.assertNotIn("--defaults polyfem", self.run_scene(self.square(defaults="itr", **peers)))
 
 
+class Cost(Case):
+    """Newton iterations of ITR's set by those of PolyFEM's, of which friction is of the step before and creeps."""
+
+    def iterations(self, task, *arguments):
+        self.call("run", pathlib.Path(SOURCE) / "examples/tasks" / task, "-o", self.folder / "out", "--overwrite", "--threads", 1,
+                  *arguments)
+        lines = (self.folder / "out/steps.jsonl").read_text().splitlines()
+        return sum(json.loads(line)["newton_iterations"] for line in lines)
+
+    def test_friction_that_settles_costs_at_most_twice_the_iterations(self):
+        for task in ("drop.json", "roll.json"):
+            self.assertLess(self.iterations(task), 2 * self.iterations(task, "--defaults", "polyfem"), task)
+
+
 class Numbers(Case):
     """Scenes of their own geometry, loads and materials, and no key of method. A number that was wrong by defaults is right."""
 

@@ -472,9 +472,7 @@ TEST_F(SceneTest, NothingIsAcceptedSilently) {
 
   json twins = base;
   twins["geometry"].push_back(twins["geometry"][1]);
-  const std::vector<std::string> of_twins = read_scene(twins).warnings;
-  ASSERT_EQ(of_twins.size(), 1u);
-  EXPECT_NE(of_twins[0].find("/geometry/2/surface_selection: /geometry/1 has the id 8 too"), std::string::npos);
+  EXPECT_TRUE(read_scene(twins).warnings.empty());  // an id of several obstacles moves them together
   const json solid = {{"geometry", {{"mesh", "tet.msh"}, {"volume_selection", 1}}},
                       {"materials", {{"type", "NeoHookean"}, {"E", 1}, {"nu", 0.3}, {"plane_strain", true}}}};
   EXPECT_EQ(wrong_place(solid), "/materials/plane_strain");

@@ -76,8 +76,10 @@ bool IncrementalPotential<Dim>::has_friction() const {
 }
 
 template <int Dim>
-std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& workspace) const {
-  if (!has_friction()) return nullptr;
+void IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& workspace, Lagged& lagged) const {
+  lagged.friction.reset();
+  lagged.friction_of_surface.reset();
+  if (!has_friction()) return;
   auto& friction = workspace.get<FrictionScratch<Dim>>().last;
   if (!friction || friction.use_count() > 1) friction = std::make_shared<FrictionEnergy<Dim>>();
   const auto lag = [&](ConstVectorView at, ConstVectorView reference) {
@@ -87,13 +89,15 @@ std::shared_ptr<const Energy> IncrementalPotential<Dim>::lag_friction(ConstVecto
     lag(on_surface(x), on_surface(velocity_reference_.view()));
   else
     lag(x, velocity_reference_.view());
-  return friction->empty() ? nullptr : of_cells(friction);
+  if (friction->empty()) return;
+  lagged.friction_of_surface = friction;
+  lagged.friction = of_cells(friction);
 }
 
 template <int Dim>
 typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstVectorView x, Workspace& workspace) const {
   Lagged lagged;
-  lagged.friction = lag_friction(x, workspace);
+  lag_friction(x, workspace, lagged);
   if (is_in(TermKind::pressure, *terms_)) {
     lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_->loads, x, terms_->scaling);
     if (lagged.pressure->empty()) lagged.pressure.reset();

@@ -40,14 +40,17 @@ class IncrementalPotential {
   /// Terms that depend on an earlier iterate; null or empty where the scene has none.
   struct Lagged {
     std::shared_ptr<const Energy> friction;
+    std::shared_ptr<FrictionEnergy<Dim>> friction_of_surface;  ///< the same, over the surface's vertices
     std::shared_ptr<PressureEnergy<Dim>> pressure;
     std::vector<std::shared_ptr<const Energy>> damping, contact_damping;
     std::shared_ptr<const Energy> follower;
   };
   /// Makes the terms that are lagged at x.
   Lagged lag(ConstVectorView x, Workspace& workspace) const;
-  std::shared_ptr<const Energy> lag_friction(ConstVectorView x, Workspace& workspace) const;
+  /// Makes friction alone anew, lagged at x.
+  void lag_friction(ConstVectorView x, Workspace& workspace, Lagged& lagged) const;
   bool has_friction() const;
+  VectorX on_surface(ConstVectorView x) const { return map_ ? map_->positions(x) : VectorX(x); }
 
   /// Calls f(kind, term) for all terms that there are, with these lagged ones: the only list of them.
   template <typename F>
@@ -85,7 +88,6 @@ class IncrementalPotential {
 
  private:
   std::shared_ptr<const Energy> of_cells(std::shared_ptr<const Energy> term) const;
-  VectorX on_surface(ConstVectorView x) const { return map_ ? map_->positions(x) : VectorX(x); }
   VelocityRule velocity() const { return {terms_->velocity_rate, velocity_reference_.view()}; }
   VelocityRule velocity_of_surface() const { return {terms_->velocity_rate, on_surface(velocity_reference_.view())}; }
 

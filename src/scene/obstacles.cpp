@@ -227,7 +227,6 @@ template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
                                      const Sets& sets, std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
-  std::map<Label, std::string> pointers;
   for (const Node& geometry : geometries.obstacles) {
     const int part = all.part.empty() ? 0 : all.part.back() + 1;
     if (is_flat_obstacle(geometry))
@@ -235,13 +234,6 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
     else
       read_obstacle<Dim>(geometry, files.get(geometry), sets, all);
     all.part.resize(all.obstacles.rest.size(), part);
-    const std::optional<Label> label = read_obstacle_label(geometry);
-    if (!label || sets.surfaces.of(*label).empty()) continue;
-    const auto [first, is_new] = pointers.try_emplace(*label, geometry.pointer());
-    if (!is_new)
-      warnings.push_back(geometry[geometry.has("surface_selection") ? "surface_selection" : "name"].pointer() + ": " +
-                         first->second + " has the id " + text_of(first->first) +
-                         " too: what names it acts on both obstacles");
   }
   files.take_notes(warnings);
   return all;

@@ -115,7 +115,7 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSliver = 0.1;                  ///< quality below which an element is one
-constexpr double kLargeRatio = 1e3;              ///< of stiffnesses or of element sizes, from which systems are hard
+constexpr double kLargeRatio = 1e3;              ///< of element sizes, from which systems are hard
 constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
 constexpr double kLargePart = 5;                 ///< of what touches or falls [m]: above it lengths may be millimetres
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
@@ -202,17 +202,10 @@ void find_odd_friction(const Setup<Dim>& setup, std::vector<std::string>& found)
 }
 
 template <int Dim>
-void find_hard_meshes(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
+void find_hard_meshes(const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
   if (figures.slivers > 0)
     found.push_back(fmt::format("{} slivers (quality below {}), the worst is element {} with {:.2g}", figures.slivers,
                                 kSliver, figures.worst_cell, figures.worst_quality));
-  double softest = kInfinity, stiffest = 0;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
-    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
-    stiffest = std::max(stiffest, setup.materials.at(body).youngs_modulus);
-  }
-  if (stiffest > kLargeRatio * softest)
-    found.push_back(fmt::format("stiffness ratio {:.2g} between bodies", stiffest / softest));
   if (figures.longest > kLargeRatio * figures.shortest)
     found.push_back(fmt::format("edges differ in length by a factor of {:.2g}", figures.longest / figures.shortest));
 }
@@ -466,7 +459,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   std::vector<std::string> found;
   find_odd_units(setup, figures, found);
   find_odd_friction(setup, found);
-  find_hard_meshes(setup, figures, found);
+  find_hard_meshes(figures, found);
   find_wrong_gravity(setup, figures, found);
   find_held(setup, found);
   find_contradictions(setup, found);

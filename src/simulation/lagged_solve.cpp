@@ -24,6 +24,7 @@
 #include "itr/types.hpp"
 #include "named.hpp"
 #include "newton/corrected_system.hpp"
+#include "newton/iterate.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -94,6 +95,10 @@ constexpr int kMostRounds = 1000;           ///< where no number limits them
 constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
+constexpr double kLooseForce = 1e-2;           ///< of the forces that act: to which the first round is solved
+constexpr int kLooseRounds = 4;                ///< at most: what goes on for longer may do so because rounds are not exact
+constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
+constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
 
@@ -110,6 +115,29 @@ enum class RoundsEnd {
 std::string_view to_string(RoundsEnd end) {
   return end == RoundsEnd::most ? "out of rounds" : end == RoundsEnd::cycle ? "in a cycle" : "not coming nearer";
 }
+
+/// Aitken's factor for the relaxation of rounds: how far to go along what a round would change (Küttler & Wall 2008).
+class Relaxation {
+ public:
+  /// The factor after a round that leaves lagged forces off by `residual` [N].
+  double factor(VectorX residual) {
+    constexpr double kLeast = 0.25, kLargest = 4;
+    constexpr double kFast = 0.5;  ///< of the residual before: rounds that come to less need no relaxation
+    if (last_.size() > 0) {
+      const VectorX change = residual - last_;
+      const double squared = change.squaredNorm();
+      const double aitken = squared > 0 ? -factor_ * last_.dot(change) / squared : 1;
+      const bool is_fast = residual.norm() < kFast * last_.norm();
+      factor_ = is_fast || aitken <= 0 ? 1 : std::clamp(aitken, kLeast, kLargest);
+    }
+    last_ = std::move(residual);
+    return factor_;
+  }
+
+ private:
+  VectorX last_;  ///< residual
+  double factor_ = 1;
+};
 
 /// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
 /// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
@@ -152,6 +180,8 @@ class LaggedSolve {
         x = start;
       }
     }
+    problem_.rounds_ = 0;
+    loose_force_ = asked_of_round(1);
     NewtonSummary summary = minimize_first(x, std::move(step_to_start));
     problem_.rounds_ = 1;
     summary.assembly_seconds += lagging_seconds;
@@ -165,22 +195,39 @@ class LaggedSolve {
     int best_round = 0, round = 1;
     RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
     std::optional<Lagged> now;  // what is lagged at x, where the last round made it
+    Relaxation relaxation;
+    const auto solve_again = [&] {
+      NewtonSummary next = minimize_lagged(x);
+      ++problem_.rounds_;
+      const bool is_fixed_point = next.converged() && next.iterations == 0 && loose_force_ == 0;
+      next.add_effort(summary);
+      summary = std::move(next);
+      return is_fixed_point;
+    };
     for (; summary.converged() && round < rounds; ++round) {
       Lagged next_lagged;
-      double norm = 0;
+      double residual, factor = 1;
+      bool is_settled;
       {
         const ScopedTimer timer(summary.assembly_seconds);
         problem_.smooth_friction_by(relative_motion<Dim>(problem_.increment_of(x)));
         next_lagged = potential_.lag(x, workspace_);
-        norm = residual_of(x, next_lagged);
+        if (setup_.lagging_tolerance > 0) {
+          residual = largest_change(x, next_lagged);
+          is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0;
+          if (round > kPlainRounds && lagged_.friction && next_lagged.friction)
+            factor = relaxation.factor(residual_of_lagging(x, next_lagged));
+        } else {
+          residual = residual_of(x, next_lagged);
+          is_settled = potential_.has_friction() && residual <= tolerance;
+        }
       }
-      if (setup_.lagging_tolerance > 0 ? largest_change(x, next_lagged) <= setup_.lagging_tolerance
-                                       : potential_.has_friction() && norm <= tolerance) {
+      if (is_settled) {
         end = RoundsEnd::asked;
         break;
       }
-      if (norm < least) {
-        least = norm;
+      if (residual < least) {
+        least = residual;
         best = x;
         best_lagged = lagged_;
         best_stiffness = stiffness_;
@@ -193,22 +240,21 @@ class LaggedSolve {
           potential_.contact()->set_stiffness(stiffness_.value);
         }
         end = RoundsEnd::stalled;
+        if (std::exchange(loose_force_, 0) > 0) solve_again();
         break;
       }
-      if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal)) {
+      if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal);
+          recurred && loose_force_ == 0) {
         end = *recurred;
         now = std::move(next_lagged);
         break;
       }
       if (previous.size() == kLongestCycle) previous.erase(previous.begin());
       previous.push_back(x);
+      if (factor != 1) next_lagged.friction_of_surface->relax(*lagged_.friction_of_surface, factor);
       lagged_ = std::move(next_lagged);
-      NewtonSummary next = minimize_lagged(x);
-      ++problem_.rounds_;
-      const bool is_fixed_point = next.converged() && next.iterations == 0;
-      next.add_effort(summary);
-      summary = next;
-      if (is_fixed_point) {
+      loose_force_ = round < std::min(kLooseRounds, rounds - 1) ? asked_of_round(residual) : 0;
+      if (solve_again()) {
         end = RoundsEnd::settled;
         break;
       }
@@ -223,12 +269,13 @@ class LaggedSolve {
   using Traits = TermTraits<Dim>;
   /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will
   /// hold them, and slide off before the next round unless friction is lagged where contact forces are new: here it is
-  /// lagged again as often as those on a body double or halve on the way, and at the end where friction itself would.
+  /// lagged again as often as those on a body double or halve on the way (where later rounds settle it: become four times or
+  /// a quarter), and at the end where friction itself would.
   NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
     constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
-    constexpr double kChange = 2;
+    const double change = setup_.lagging_tolerance > 0 ? 4 : 2;
     NewtonSummary all;
-    const auto is_near = [](double a, double b) { return a <= kChange * b && b <= kChange * a; };
+    const auto is_near = [change](double a, double b) { return a <= change * b && b <= change * a; };
     const bool may_lag = least_motion_ && potential_.has_friction();
     VectorX best;
     double least = std::numeric_limits<double>::infinity();
@@ -245,8 +292,8 @@ class LaggedSolve {
       all = std::move(summary);
       if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
       Lagged next = lagged_;
-      next.friction = potential_.lag_friction(x, workspace_);
-      if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / kChange) return all;
+      potential_.lag_friction(x, workspace_, next);
+      if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / change) return all;
       lagged_ = std::move(next);
       ++(is_outdated ? on_the_way : at_the_end);
       if (!is_outdated) continue;
@@ -259,7 +306,7 @@ class LaggedSolve {
       // A stiff barrier bounces: the last of these iterates may have forces far too large, or none that hold a body.
       if (on_the_way == kMostOnTheWay && best.size() > 0) {
         x = best;
-        lagged_.friction = potential_.lag_friction(x, workspace_);
+        potential_.lag_friction(x, workspace_, lagged_);
       }
     }
   }
@@ -267,10 +314,7 @@ class LaggedSolve {
   double residual_of(const VectorX& x, const Lagged& lagged) {
     VectorX gradient = VectorX::Zero(x.size());
     EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
-    double squared = 0;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] != kNone) squared += gradient[i] * gradient[i];
-    return std::sqrt(squared);
+    return Norms(dofs_, NewtonNorm::euclidean, {}).of_gradient(gradient);
   }
   /// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms
   /// before held dofs move: so it is in the regression values of peers' scenes.
@@ -333,6 +377,7 @@ class LaggedSolve {
         return changed;
       };
     }
+    if (setup_.lagging_tolerance > 0 && lagged_.friction) follow_friction(d, extras);
     enum class EndedBy { solver, flight, caller } ended_by = EndedBy::solver;
     std::optional<FlightGuard<Dim>> guard;
     if (!terms_.has_inertia)
@@ -351,8 +396,12 @@ class LaggedSolve {
       return least_motion_->rigid_motions(base_ + iterate, dofs);
     });
     NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.system();
-    NewtonSummary summary =
-        minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, setup_.newton, workspace_, extras);
+    NewtonOptions options = setup_.newton;
+    if (loose_force_ > 0) {
+      options.force_tolerance = std::max(options.force_tolerance, loose_force_);
+      extras.must_be_minimum = false;
+    }
+    NewtonSummary summary = minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
     x = base_ + d;
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
@@ -366,6 +415,18 @@ class LaggedSolve {
       return summary;
     }
     return explained(std::move(summary), sum, x);
+  }
+  /// Lets a solve from the increment d be primal-dual in friction.
+  void follow_friction(const VectorX& d, NewtonExtras& extras) {
+    lagged_.friction_of_surface->begin_solve(potential_.on_surface(base_ + d), problem_.rounds_ > 0);
+    extras.on_iteration = [&, before = extras.on_iteration, weights = extras.norm_weights,
+                           last = VectorX(d)](const NewtonProgress& progress) mutable {
+      const double step = Norms(dofs_, setup_.newton.norm, weights).of_step(d - last);
+      const double fraction = progress.step_norm > 0 ? std::min(1.0, step / progress.step_norm) : 1;
+      lagged_.friction_of_surface->follow(potential_.on_surface(base_ + d), fraction);
+      last = d;
+      return !before || before(progress);
+    };
   }
   void follow_least_motion(const EnergySum& sum, const VectorX& d) {
     VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
@@ -451,6 +512,17 @@ class LaggedSolve {
                              largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
     return size > 0 ? largest(after - before) / size : 0;
   }
+  /// Lagged forces on unknowns at x, `now` less those of `lagged_`, scaled.
+  VectorX residual_of_lagging(const VectorX& x, const Lagged& now) {
+    const auto is_lagged = [](const Traits& term) { return term.needs_velocities || term.has_no_potential; };
+    return forces_of(x, now, is_lagged) - forces_of(x, lagged_, is_lagged);
+  }
+  /// Forces to which to solve a round, as NewtonOptions::force_tolerance, after one that changed lagged ones by `change`: as
+  /// inexact Newton methods do (Dembo, Eisenstat & Steihaug 1982). 0: as exactly as the last round.
+  double asked_of_round(double change) const {
+    const bool may_be_loose = setup_.lagging_tolerance > 0 && potential_.has_friction() && most_rounds() > 1;
+    return may_be_loose && change > setup_.lagging_tolerance ? std::min(kLooseForce, kLooseByChange * change) : 0;
+  }
   /// Warns or fails where rounds of lagging ended unsettled after `rounds`. `now`: lagged at x, or nothing.
   void judge_lagging(const VectorX& x, std::optional<Lagged> now, std::string_view how, int rounds, NewtonSummary& summary) {
     if (!now) now = potential_.lag(x, workspace_);
@@ -495,6 +567,7 @@ class LaggedSolve {
 
   StepProblem<Dim>& problem_;
   bool must_settle_;
+  double loose_force_ = 0;  ///< of the forces that act: to which a round is solved that is not the last; 0: as the last
   const StepSetup<Dim>& setup_ = problem_.setup_;
   const PotentialTerms<Dim>& terms_ = problem_.terms_;
   const CellSet<Dim>& cells_ = problem_.cells_;

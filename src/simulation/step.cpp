@@ -18,6 +18,7 @@
 #include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "newton/round_off.hpp"
+#include "newton/saddle.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/invariants.hpp"
@@ -399,12 +400,13 @@ class StepSolver {
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
     report_.indefinite += summary.indefinite;
     if (summary.converged() && !summary.message.empty()) {
-      if (summary.message == kAtRoundOff)
+      if (summary.message == kAtRoundOff || summary.message == kFlatSaddle)
         tools_.logger.debug(fmt::format("step {}: {}", next_.step, summary.message));
       else
         warn(summary.message);
     }
-    if (summary.iterations > kManyIterations) warn(problem_->describe_effort(summary));
+    if (summary.iterations > kManyIterations)
+      tools_.logger.info(fmt::format("step {}: {}", next_.step, problem_->describe_effort(summary)));
     if (summary.linear_residual > kPoorResidual)
       warn(fmt::format("linear solves by {} reached a relative residual of {:.1e} only: {}",
                        tools_.cache.system.solver().name(), summary.linear_residual,

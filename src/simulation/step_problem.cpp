@@ -183,7 +183,7 @@ template <int Dim>
 EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   EnergyReport report;
   Lagged shown = lagged_;
-  shown.friction = potential_.lag_friction(x, workspace_);
+  potential_.lag_friction(x, workspace_, shown);
   potential_.for_each(shown, [&](TermKind kind, const auto& term) {
     entry_of(report, traits<Dim>(kind).energy) += term->value(x, workspace_) / terms_.scaling;
   });

@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace itr {
@@ -14,6 +15,20 @@ namespace {
 double f0(double y, double eps) { return y < eps ? y * y * (1 - y / (3 * eps)) / eps + eps / 3 : y; }
 double f1_over_y(double y, double eps) { return y < eps ? (2 - y / eps) / eps : 1 / y; }
 double f2(double y, double eps) { return y < eps ? 2 * (1 - y / eps) / eps : 0; }
+
+/// Derivative by the slip velocity v of w(v), where y / f1(y) w = v for y = |v|, linearised at any w (Chan, Golub & Mulet
+/// 1999); of f1(y) v / y where w is that. Symmetrised; its eigenvalues are >= 0 for |w| <= 1.
+template <int N>
+Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, double eps) {
+  const double y = v.norm(), isotropic = f1_over_y(y, eps);
+  Mat<N> inner = Mat<N>::Identity();
+  if (y > 0) {
+    const double slope = y < eps ? 1 / (eps * eps * isotropic * isotropic) : 1;  // of y / f1(y)
+    const Mat<N> turn = slope / (2 * y) * w * v.transpose();
+    inner -= turn + turn.transpose();
+  }
+  return isotropic * inner;
+}
 
 Eigen::Matrix<double, 2, 1> tangent_basis(const Vec<2>& normal) { return {-normal[1], normal[0]}; }
 Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
@@ -39,12 +54,17 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
   reference_ = velocity_reference;
   epsv_ = options.friction_velocity;
   scale_ = scale;
+  is_primal_dual_ = false;
   pairs_.clear();
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
     const double distance = std::sqrt(q.squared);
-    Pair pair{s.vertices, s.size(), q.coefficients, tangent_basis(Vec<Dim>(q.separation / distance)), 0};
+    Pair pair{.vertices = s.vertices,
+              .size = s.size(),
+              .coefficients = q.coefficients,
+              .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
+              .force = 0};
     pair.force =
         options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
@@ -60,6 +80,55 @@ auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) con
     relative += pair.coefficients[k] * (x.segment<Dim>(dof) - reference.segment<Dim>(dof));
   }
   return rate_ * (pair.tangents.transpose() * relative);
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::begin_solve(ConstVectorView x, bool is_near) {
+  is_primal_dual_ = true;
+  for (Pair& pair : pairs_) {
+    pair.slip = slip_velocity(pair, x);
+    pair.ratio.setZero();
+    if (is_near) pair.ratio = f1_over_y(pair.slip.norm(), epsv_) * pair.slip;
+  }
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::follow(ConstVectorView x, double fraction) {
+  for (Pair& pair : pairs_) {
+    const Vec<kTangents> slip = slip_velocity(pair, x);
+    const Mat<kTangents> derivative = linearised_ratio<kTangents>(pair.slip, pair.ratio, epsv_);
+    const Vec<kTangents> at_slip = f1_over_y(pair.slip.norm(), epsv_) * pair.slip;
+    pair.ratio += fraction * (at_slip - pair.ratio) + derivative * (slip - pair.slip);
+    pair.ratio /= std::max(1.0, pair.ratio.norm());
+    pair.slip = slip;
+  }
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::relax(const FrictionEnergy& before, double factor) {
+  const auto is_before = [](const Pair& a, const Pair& b) { return a.vertices < b.vertices; };
+  std::vector<Pair> old = before.pairs_, relaxed;
+  std::stable_sort(old.begin(), old.end(), is_before);
+  std::stable_sort(pairs_.begin(), pairs_.end(), is_before);
+  const double rest = std::max(0.0, 1 - factor);  // of pairs that are no more
+  const auto keep = [&](const Pair& gone) {
+    relaxed.push_back(gone);
+    relaxed.back().force *= rest;
+  };
+  auto next = old.begin();
+  for (Pair pair : pairs_) {
+    for (; next != old.end() && is_before(*next, pair); ++next)
+      if (rest > 0) keep(*next);
+    if (next != old.end() && !is_before(pair, *next)) {
+      pair.force = std::max(0.0, next->force + factor * (pair.force - next->force));
+      ++next;
+    } else {
+      pair.force *= std::min(1.0, factor);
+    }
+    relaxed.push_back(pair);
+  }
+  for (; next != old.end() && rest > 0; ++next) keep(*next);
+  pairs_ = std::move(relaxed);
 }
 
 template <int Dim>
@@ -86,7 +155,10 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     const double y = v.norm(), isotropic = f1_over_y(y, epsv_);
     // Along v the second derivative is f2, across it f1 / y; both are >= 0, so only the sign of the force can spoil it.
     Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
-    if (y > 0) inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
+    if (is_primal_dual_)
+      inner = linearised_ratio<kTangents>(v, pair.ratio, epsv_);
+    else if (y > 0)
+      inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
     const double force = projected(pair.force, psd);
     if (force == 0) continue;
     const Mat<Dim> world = scale_ * rate_ * force * pair.tangents * inner * pair.tangents.transpose();

@@ -25,6 +25,15 @@ class FrictionEnergy final : public Energy {
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
   bool empty() const { return pairs_.empty(); }
 
+  /// Begins a solve at x by the primal-dual Newton method (docs/theory.md, "Friction"): Hessians from here on are those of
+  /// the law of friction linearised in slip and force, so that few iterations find what sticks, however small eps_v is.
+  /// `is_near`: forces at x are nearly those of the solution; else nothing is known of them.
+  void begin_solve(ConstVectorView x, bool is_near);
+  /// Follows that solve to x, which is `fraction` of a Newton step away.
+  void follow(ConstVectorView x, double fraction);
+  /// Moves the normal forces from those of `before` by `factor` times the way to its own: less or more than that.
+  void relax(const FrictionEnergy& before, double factor);
+
  private:
   static constexpr int kTangents = Dim - 1;
   struct Pair {
@@ -33,6 +42,8 @@ class FrictionEnergy final : public Energy {
     Vec<4> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
     Eigen::Matrix<double, Dim, kTangents> tangents;
     double force;  ///< mu * normal force * weight [N]
+    /// Slip velocity at the iterate [m/s], and friction by the most that it can be: as linearised, the second unknown.
+    Vec<kTangents> slip = Vec<kTangents>::Zero(), ratio = Vec<kTangents>::Zero();
   };
   Vec<kTangents> slip_velocity(const Pair& pair, ConstVectorView x) const;
 
@@ -40,6 +51,7 @@ class FrictionEnergy final : public Energy {
   double rate_ = 1;  ///< and the reference of VelocityRule
   ScratchVector reference_;
   double epsv_ = 0;
+  bool is_primal_dual_ = false;
   double scale_ = 1;
 };
 
