@@ -47,7 +47,7 @@ class Packages(unittest.TestCase):
         self.assertLessEqual({"itr", "libitr0", "libitr-dev"}, set(self.packages))
         self.assertIn("libhdf5", self.field("itr", "Depends"))
         self.assertIn("libtbb", self.field("libitr0", "Depends"))
-        self.assertRegex(self.field("libitr-dev", "Depends"), r"libitr0 \(= 0\.1\.0-1\)")
+        self.assertRegex(self.field("libitr-dev", "Depends"), r"libitr0 \(= 0\.2\.0-1\)")
 
     def test_each_has_its_own_files(self):
         owner = {}

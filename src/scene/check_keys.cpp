@@ -41,7 +41,8 @@ std::string name_by_meaning(const std::string& key, const std::string& pattern, 
   if (key.size() < kTelling) return "";
   for (const std::string& name : names) {
     const Entry* entry = key_table().find(std::string(pattern).append("/").append(name));
-    const std::string_view meaning = entry ? entry->key->meaning : "";
+    if (!entry) continue;
+    const std::string_view meaning = entry->key->meaning;
     for (std::size_t at = meaning.find(key); at != meaning.npos; at = meaning.find(key, at + 1))
       if (const std::size_t end = at + key.size();
           (at == 0 || !is_letter(meaning[at - 1])) && (end == meaning.size() || !is_letter(meaning[end])))

@@ -18,7 +18,7 @@ TOLERANCE = "3 %; 0.5 % in other units; twice the iterations"
 NEEDS = ("numpy", "meshio")
 
 FORCE, UNITS, COST = 0.03, 0.005, 2
-# What an expert might set instead: surfaces that stand off more, and friction of the step before.
+# Settings of an expert: surfaces that stand off more, and friction of the step before.
 BY_HAND = {"wide d-hat": {"contact": {"dhat": 10}}, "wider d-hat": {"contact": {"dhat": 30}},
            "one round": {"contact": {"dhat": 3}, "solver": {"contact": {"friction_iterations": 1}, "lagging_tolerance": 0}}}
 

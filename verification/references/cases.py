@@ -117,7 +117,7 @@ class Change:
     positions: float | None = 0.0
 
 
-PLANNED: list[Change] = [Change("obstacles that share an id are no longer warned of", ("masticator*",), ("reports",))]
+PLANNED: list[Change] = []
 
 
 def planned(name):
