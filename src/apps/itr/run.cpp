@@ -292,8 +292,7 @@ class Run {
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     const bool is_finished = outcome == kFinished;
-    if (is_finished)
-      fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
+    if (is_finished) fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
     if (is_finished) tell_remeshing();
     count_warnings();
     if (with_report_) write_report();
@@ -397,8 +396,7 @@ class Run {
           return failed;
         }
       }();
-      if (!result.ok && stop_now)
-        return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
+      if (!result.ok && stop_now) return fmt::format("interrupted in step {}, which is dropped", simulation_.steps() + 1);
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
