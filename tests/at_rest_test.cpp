@@ -219,6 +219,26 @@ TEST(Values, OfProgramsThatAreNoneEndTheStepBeforeItIsTaken) {
   EXPECT_EQ(simulation.state().history.x[0], x);
 }
 
+TEST(Values, OfMaterialsThatAreNoneAreNamedWithTheirPlace) {
+  const auto wrong = [](double value) { return [value](const Vec<3>& X) { return X[0] > 0.1 ? value : 0.3; }; };
+  const auto reason = [&](const std::function<void(Material&)>& change) -> std::string {
+    auto setup = plain_square(2, 1e6);
+    change(setup.materials[1]);
+    linear::Registry registry;
+    try {
+      Simulation<2>(setup, registry).advance();
+    } catch (const InputError& error) {
+      return error.parts().place;
+    }
+    return "none";
+  };
+  EXPECT_EQ(reason([](Material&) {}), "none");
+  EXPECT_EQ(reason([&](Material& m) { m.youngs_modulus_at = wrong(std::nan("")); }), "E");
+  EXPECT_EQ(reason([&](Material& m) { m.youngs_modulus_at = wrong(-1); }), "E");
+  EXPECT_EQ(reason([&](Material& m) { m.poisson_ratio_at = wrong(HUGE_VAL); }), "nu");
+  EXPECT_EQ(reason([&](Material& m) { m.density_at = wrong(std::nan("")); }), "rho");
+}
+
 TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {
   const auto count = [](double dt, double traction, double modulus) {
     auto setup = plain_square(1, modulus);

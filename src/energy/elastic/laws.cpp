@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "energy/elastic/laws.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
@@ -8,6 +10,7 @@
 
 #include "core/check.hpp"
 #include "isotropic.hpp"
+#include "itr/core.hpp"
 #include "point.hpp"
 
 namespace itr {
@@ -65,13 +68,22 @@ EigenSystem<Dim> own_eigensystem(const Mat<Dim>& F, const OwnLaw& law) {
   return system;
 }
 
+/// The value of a function of a material at X. Throws InputError for one that is no number >= `least`.
+template <int Dim>
+double value_at(const SpaceFunction& f, const Vec<Dim>& X, const char* name, double least) {
+  const double value = f(in_space<Dim>(X));
+  if (std::isfinite(value) && value >= least) return value;
+  throw InputError(
+      {"", name, fmt::format("{} at ({:.6g})", value, fmt::join(X, ", ")), least < 0 ? "a number > -1" : "a number >= 0"});
+}
+
 }  // namespace
 
 template <int Dim>
 ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
-  if (material.youngs_modulus_at) E = material.youngs_modulus_at(in_space<Dim>(X));
-  if (material.poisson_ratio_at) nu = material.poisson_ratio_at(in_space<Dim>(X));
+  if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0);
+  if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1);
   return {material.law,
           {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
           material.mooney_rivlin,
@@ -80,7 +92,7 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
 
 template <int Dim>
 double mass_density(const Material& material, const Vec<Dim>& X) {
-  return material.density_at ? material.density_at(in_space<Dim>(X)) : material.density;
+  return material.density_at ? value_at<Dim>(material.density_at, X, "rho", 0) : material.density;
 }
 
 template <int Dim>
