@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "contact_scenes.hpp"
 #include "core/parallel.hpp"
 #include "derivatives.hpp"
 #include "energy/contact/friction.hpp"
@@ -15,32 +16,6 @@
 
 namespace itr {
 namespace {
-
-/// An open zigzag of obstacle edges below vertices of bodies, closer than dhat in some places.
-struct ContactScene {
-  CollisionSurface surface;
-  VectorX x;
-  ContactScene(unsigned seed, bool convergent) {
-    options.enabled = true;
-    options.dhat = 0.2;
-    options.convergent = convergent;
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> noise(-0.04, 0.04);
-    const int n = 8;  // two polylines of n vertices, one above the other
-    x.resize(4 * n);
-    std::vector<Vec<2>> rest;
-    std::vector<std::array<int, 2>> edges;
-    for (int line = 0; line < 2; ++line)
-      for (int i = 0; i < n; ++i) {
-        const int v = line * n + i;
-        rest.emplace_back(0.3 * i, line);
-        x.segment<2>(2 * v) << 0.3 * i + 0.1 * line + noise(random), 0.12 * line + noise(random);
-        if (i + 1 < n) edges.push_back({v, v + 1});
-      }
-    surface = make_collision_surface<2>(edges, {}, {}, rest, std::vector<char>(2 * n, 1));
-  }
-  ContactOptions options;
-};
 
 class Contact : public ::testing::TestWithParam<bool> {};
 
@@ -96,38 +71,6 @@ TEST(Contact, ConvergentFormCountsOverlappingEdgesOnce) {
   };
   EXPECT_NEAR(energy_over(0.0), energy_over(0.5), 1e-12 * energy_over(0.5));
 }
-
-/// Two sheets of triangles, one above the other and turned by `angle`; parallel edges where it is 0.
-struct ContactScene3 {
-  CollisionSurface surface;
-  VectorX x;
-  ContactOptions options;
-  /// Sheets of n x n vertices: from 8 on pairs are found by trees, and in several blocks.
-  ContactScene3(unsigned seed, bool convergent, double angle, double roughness, int n = 4) {
-    options.enabled = true;
-    options.dhat = 0.2;
-    options.convergent = convergent;
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> noise(-roughness, roughness);
-    std::vector<Vec<3>> rest;
-    std::vector<std::array<int, 3>> triangles;
-    for (int sheet = 0; sheet < 2; ++sheet)
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
-          const int v = static_cast<int>(rest.size());
-          const double c = std::cos(angle * sheet), s = std::sin(angle * sheet), a = 0.3 * i + 0.08 * sheet, b = 0.3 * j;
-          rest.emplace_back(c * a - s * b, s * a + c * b, 0.12 * sheet);
-          if (i + 1 < n && j + 1 < n) {
-            triangles.push_back({v, v + n, v + n + 1});
-            triangles.push_back({v, v + n + 1, v + 1});
-          }
-        }
-    x.resize(3 * rest.size());
-    for (std::size_t v = 0; v < rest.size(); ++v)
-      x.segment<3>(3 * v) = rest[v] + Vec<3>(noise(random), noise(random), noise(random));
-    surface = make_collision_surface<3>({}, triangles, {}, rest, std::vector<char>(rest.size(), 1));
-  }
-};
 
 TEST_P(Contact, DerivativesMatchDifferencesIn3D) {
   int mollified = 0;
@@ -328,84 +271,6 @@ TEST(Contact3, ObstaclePointsAndEdgesAreFelt) {
   }
   EXPECT_EQ(by_point, 1);
   EXPECT_GE(by_edge, 1);
-}
-
-/// Slow slip of a pair of sheets or lines.
-template <int Dim, typename Scene>
-void expect_friction_derivatives(Scene scene, unsigned seed) {
-  scene.options.friction_coefficient = 0.4;
-  scene.options.friction_velocity = 0.05;
-  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
-  Workspace workspace;
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, 0.001);
-  const VectorX reference = scene.x + VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
-  const FrictionEnergy<Dim> friction(contact, scene.x, workspace, scene.options, {20, reference}, 0.01);
-  ASSERT_FALSE(friction.empty());
-  expect_derivatives(friction, scene.x, 1e-7, 1e-5);
-  expect_psd(friction, scene.x);
-}
-
-TEST(Friction, DerivativesMatchDifferences) {
-  for (unsigned seed = 0; seed < 10; ++seed) expect_friction_derivatives<2>(ContactScene(seed, false), seed);
-  for (unsigned seed = 0; seed < 4; ++seed) expect_friction_derivatives<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
-}
-
-/// Hessians of a solve that is primal-dual in friction: the true one where forces are those of the slip, and one without
-/// negative eigenvalues on the way from one slip to another.
-template <int Dim, typename Scene>
-void expect_primal_dual_hessians(Scene scene, unsigned seed) {
-  scene.options.friction_coefficient = 0.4;
-  scene.options.friction_velocity = 0.05;
-  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
-  Workspace workspace;
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, 0.003);
-  const auto moved = [&] { return VectorX(scene.x + VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); })); };
-  const VectorX reference = moved(), next = moved();
-  FrictionEnergy<Dim> friction(contact, scene.x, workspace, scene.options, {20, reference}, 0.01);
-  const auto hessian = [&] { return hessian_of(friction, scene.x, PsdProjection::none); };
-  const MatrixX plain = hessian();
-  friction.begin_solve(scene.x, true);
-  EXPECT_LE((hessian() - plain).norm(), 1e-12 * plain.norm());
-  friction.begin_solve(scene.x, false);
-  EXPECT_GT((hessian() - plain).norm(), 0.01 * plain.norm());
-  expect_psd(friction, scene.x);
-  for (const double share : {0.3, 1.0}) {
-    friction.follow(next, share);
-    expect_psd(friction, next);
-  }
-}
-
-TEST(Friction, PrimalDualHessiansAreTrueAtTheEndAndNeverIndefinite) {
-  for (unsigned seed = 0; seed < 10; ++seed) expect_primal_dual_hessians<2>(ContactScene(seed, false), seed);
-  for (unsigned seed = 0; seed < 4; ++seed) expect_primal_dual_hessians<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
-}
-
-TEST(Friction, RelaxedForcesLieOnTheLineBetweenTwo) {
-  ContactScene scene(1, false);
-  scene.options.friction_coefficient = 0.4;
-  Workspace workspace;
-  const VectorX reference = scene.x.array() + 0.001 * VectorX::LinSpaced(scene.x.size(), 0, 1).array();
-  const ContactEnergy<2> soft(scene.surface, scene.options, 3, 0.5), stiff(scene.surface, scene.options, 7, 0.5);
-  VectorX apart = scene.x;
-  for (Eigen::Index i = apart.size() / 2; i < apart.size(); ++i) apart[i] += 1;
-  const auto lagged = [&](const ContactEnergy<2>& contact, const VectorX& x) {
-    return FrictionEnergy<2>(contact, x, workspace, scene.options, {20, reference}, 0.01);
-  };
-  const FrictionEnergy<2> before = lagged(soft, scene.x), after = lagged(stiff, scene.x), none = lagged(soft, apart);
-  ASSERT_TRUE(none.empty());
-  const VectorX a = gradient_of(before, scene.x), b = gradient_of(after, scene.x);
-  for (const double factor : {0.25, 1.0, 1.5}) {
-    FrictionEnergy<2> relaxed = after;
-    relaxed.relax(before, factor);
-    EXPECT_LE((gradient_of(relaxed, scene.x) - (a + factor * (b - a))).norm(), 1e-12 * b.norm()) << factor;
-  }
-  FrictionEnergy<2> begun = after, ended = none;
-  begun.relax(none, 0.25);
-  EXPECT_LE((gradient_of(begun, scene.x) - 0.25 * b).norm(), 1e-12 * b.norm());
-  ended.relax(before, 0.25);
-  EXPECT_LE((gradient_of(ended, scene.x) - 0.75 * a).norm(), 1e-12 * a.norm());
 }
 
 /// A scene whose vertices y = A x follow from others: each mostly from its own, some also from up to three others.

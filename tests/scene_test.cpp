@@ -429,8 +429,7 @@ TEST_F(SceneTest, ConditionsAndMotions) {
   EXPECT_NE(scene.warnings[0].find("/boundary_conditions/dirichlet_boundary/3"), std::string::npos);
 }
 
-/// Flat obstacles need no file, and reach far beyond the bodies.
-/// What is given, but cannot do what it says, is said.
+/// A key or an entry that cannot do what it says leads to an error or a warning.
 TEST_F(SceneTest, NothingIsAcceptedSilently) {
   const json base = square(json::parse(R"json({"geometry": [
       {"mesh": "square.obj", "volume_selection": 1, "surface_selection": {"threshold": 1e-3},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Where the Hessian blocks of stencils go: a dense matrix for patches, a sparse one with a reusable pattern for the mesh.
-// What is added to an entry is added in an order that does not depend on the number of threads, so the bits do not either.
+// Addends of an entry come in an order that does not depend on the number of threads, so its bits do not either.
 #pragma once
 
 #include <array>

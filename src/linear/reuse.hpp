@@ -46,7 +46,7 @@ struct SolveCounts {
 /// order, whatever its pattern, may be given to conjugate gradients with the last factor as preconditioner (solve_system);
 /// where they take too long or meet a direction of no positive curvature, the matrix is factorised.
 ///
-/// What is tried depends on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
+/// Choices depend on counts (flops of a factorisation, entries of a factor, iterations), never on time. A matrix
 /// that iterations solved to 1e-8 is positive definite: the factor is (none of an indefinite matrix is kept), they start
 /// from an error with a part in every direction, and with positive curvatures throughout, the part in a direction of
 /// negative curvature could not have shrunk. (The residual does not show one whose curvature is below some 1e-4 of the

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -19,10 +18,11 @@
 #include "diagnosis.hpp"
 #include "energy/least_motion.hpp"
 #include "fem/hessian_sink.hpp"
+#include "flight_guard.hpp"
 #include "held_turn.hpp"
 #include "itr/core.hpp"
 #include "itr/types.hpp"
-#include "named.hpp"
+#include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
 #include "newton/iterate.hpp"
 #include "simulation/step_problem.hpp"
@@ -31,68 +31,10 @@ namespace itr {
 
 namespace {
 
-constexpr double kFar = 10, kFarthest = 100;  ///< times the extent: of loose parts, of any node
-
-template <int Dim>
-double extent_of(ConstVectorView start, const DofMap& dofs, ConstVectorView target) {
-  Eigen::AlignedBox<double, Dim> box;
-  for (Eigen::Index i = 0; i < start.size(); i += Dim) {
-    const Vec<Dim> here = start.segment<Dim>(i);
-    box.extend(here);
-    for (int c = 0; c < Dim; ++c) {
-      if (dofs.unknown[i + c] != kNone) continue;
-      Vec<Dim> there = here;
-      there[c] = target[i + c];
-      box.extend(there);
-    }
-  }
-  return box.diagonal().norm();
-}
-
-/// Ends solves without inertia in which loads carry bodies farther than anything of the scene could meet them.
-template <int Dim>
-class FlightGuard {
- public:
-  /// `start`: positions where the step begins, of obstacles too; `target`: those to which held dofs move; `loose`: parts
-  /// that conditions do not hold. All of them must outlive this.
-  FlightGuard(ConstVectorView start, const DofMap& dofs, ConstVectorView target, std::span<const LoosePart<Dim>> loose)
-      : start_(start), loose_(loose), extent_(extent_of<Dim>(start, dofs, target)) {}
-  /// Whether a loose part, or any node, has gone too far by the displacements d.
-  bool has_flown(ConstVectorView d) {
-    for (const LoosePart<Dim>& part : loose_) {
-      if (!(d.segment<Dim>(Dim * part.nodes.front()).norm() > kFar * extent_)) continue;
-      flown_ = &part;
-      return true;
-    }
-    return d.lpNorm<Eigen::Infinity>() > kFarthest * extent_;
-  }
-  /// The reason, once that is so.
-  std::string describe(const Units& units) const {
-    if (!flown_)
-      return fmt::format(
-          "loads move bodies that their conditions hold by {:g} times the extent of the scene: they exceed what the bodies "
-          "can "
-          "carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
-          kFarthest);
-    return fmt::format(
-        "loads push a body that its conditions do not hold, the one at {}, and nothing comes in its way: there is no "
-        "equilibrium; hold it (a point, or rollers on a side), or take dynamics (/time/quasistatic = false)",
-        point_text<Dim>(start_.template segment<Dim>(Dim * flown_->nodes.front()), units, 3));
-  }
-
- private:
-  ConstVectorView start_;
-  std::span<const LoosePart<Dim>> loose_;
-  double extent_;                          ///< of bodies, obstacles and targets [m]
-  const LoosePart<Dim>* flown_ = nullptr;  ///< null: a body that conditions hold
-};
-
-constexpr double kFixedPoint = 1e-12;       ///< of the bodies' diagonal: rounds of lagging that move nothing more are over
-constexpr double kSameState = 1e-3;         ///< of a solve's step tolerance: states nearer than that are one
-constexpr std::size_t kLongestCycle = 16;   ///< rounds that are remembered
-constexpr int kPressureRounds = 50;         ///< most, where pressure has no potential
-constexpr int kMostRounds = 1000;           ///< where no number limits them
-constexpr double kLoadsWorthSaying = 1e-2;  ///< of what loads may be off: less is not said
+constexpr std::size_t kLongestCycle = 16;      ///< rounds that are remembered
+constexpr int kPressureRounds = 50;            ///< most, where pressure has no potential
+constexpr int kMostRounds = 1000;              ///< where no number limits them
+constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: less is not said
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kLooseForce = 1e-2;           ///< of the forces that act: to which the first round is solved
@@ -101,55 +43,6 @@ constexpr int kPlainRounds = 10;               ///< after which rounds are relax
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
-
-/// How rounds of lagging end.
-enum class RoundsEnd {
-  settled,  ///< another round changes nothing, to the solver's tolerances
-  asked,    ///< as many as the scene asks for, or forces to its tolerance
-  most,     ///< as many as there may be
-  cycle,    ///< an earlier round has been reached again
-  stalled   ///< forces have not come nearer for long
-};
-
-/// Says how rounds ended that did not settle.
-std::string_view to_string(RoundsEnd end) {
-  return end == RoundsEnd::most ? "out of rounds" : end == RoundsEnd::cycle ? "in a cycle" : "not coming nearer";
-}
-
-/// Aitken's factor for the relaxation of rounds: how far to go along what a round would change (Küttler & Wall 2008).
-class Relaxation {
- public:
-  /// The factor after a round that leaves lagged forces off by `residual` [N].
-  double factor(VectorX residual) {
-    constexpr double kLeast = 0.25, kLargest = 4;
-    constexpr double kFast = 0.5;  ///< of the residual before: rounds that come to less need no relaxation
-    if (last_.size() > 0) {
-      const VectorX change = residual - last_;
-      const double squared = change.squaredNorm();
-      const double aitken = squared > 0 ? -factor_ * last_.dot(change) / squared : 1;
-      const bool is_fast = residual.norm() < kFast * last_.norm();
-      factor_ = is_fast || aitken <= 0 ? 1 : std::clamp(aitken, kLeast, kLargest);
-    }
-    last_ = std::move(residual);
-    return factor_;
-  }
-
- private:
-  VectorX last_;  ///< residual
-  double factor_ = 1;
-};
-
-/// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in
-/// circles, and then every further round repeats an earlier one. `diagonal`: of the bodies [m].
-std::optional<RoundsEnd> has_recurred(const VectorX& x, const std::vector<VectorX>& previous, double step_tolerance,
-                                      double diagonal) {
-  const double last = (x - previous.back()).lpNorm<Eigen::Infinity>();
-  if (last <= kFixedPoint * diagonal) return RoundsEnd::settled;
-  const bool has_met = std::any_of(previous.begin(), previous.end() - 1,
-                                   [&](const VectorX& y) { return (x - y).norm() <= kSameState * step_tolerance; });
-  if (!has_met) return std::nullopt;
-  return (x - previous.back()).norm() <= step_tolerance ? RoundsEnd::settled : RoundsEnd::cycle;
-}
 
 }  // namespace
 
