@@ -178,6 +178,22 @@ TEST(HostForces, ThatDoNotSettleToTheToleranceAreWarnedOfWhereNoStepIsCut) {
   EXPECT_NE(warnings.find("expected at most 1e-06 (/solver/lagging_tolerance)"), std::string::npos) << warnings;
 }
 
+/// Where there may be friction, the first rounds are loose; where rounds lead away, the first one is the best.
+TEST(HostForces, ThatDoNotSettleLeaveASolutionThatIsNotLoose) {
+  auto setup = between_springs(9000);
+  setup.materials[1].youngs_modulus = 3e4;
+  setup.body_acceleration = [](const Vec<2>& X, double) { return Vec<2>(0, -100 - 1000 * X[0]); };
+  setup.contact = {.enabled = true, .dhat = 1e-3, .friction_coefficient = 0.3};
+  setup.newton = {};
+  setup.lagging_tolerance = 1e-6;
+  setup.lagged_load_tolerance = 1;
+  std::string warnings;
+  const StepResult result = step_of(setup, &warnings);
+  EXPECT_TRUE(result.ok) << result.reason;
+  EXPECT_NE(warnings.find("not coming nearer"), std::string::npos) << warnings;
+  EXPECT_LT(result.forces.residual.norm(), 1e-3);  // of 10 kN
+}
+
 TEST(HostForces, InACycleAreNoSolution) {
   // On the whole block, of its mass by the square of the time step: it goes there and back from round to round.
   auto setup = block<2>();

@@ -53,8 +53,7 @@ class FlightGuard {
     if (!flown_)
       return fmt::format(
           "loads move bodies that their conditions hold by {:g} times the extent of the scene: they exceed what the bodies "
-          "can "
-          "carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
+          "can carry, and there is no equilibrium near; smaller loads or steps, or dynamics (/time/quasistatic = false)",
           kFarthest);
     return fmt::format(
         "loads push a body that its conditions do not hold, the one at {}, and nothing comes in its way: there is no "

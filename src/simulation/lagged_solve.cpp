@@ -84,6 +84,7 @@ class LaggedSolve {
     VectorX best = x;
     Lagged best_lagged = lagged_;
     BarrierStiffness best_stiffness = stiffness_;
+    bool is_best_loose = loose_force_ > 0;
     double least = std::numeric_limits<double>::infinity();
     int best_round = 0, round = 1;
     RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
@@ -124,6 +125,7 @@ class LaggedSolve {
         best = x;
         best_lagged = lagged_;
         best_stiffness = stiffness_;
+        is_best_loose = loose_force_ > 0;
         best_round = round;
       } else if (round - best_round >= kPatience) {
         x = best;
@@ -133,7 +135,7 @@ class LaggedSolve {
           potential_.contact()->set_stiffness(stiffness_.value);
         }
         end = RoundsEnd::stalled;
-        if (std::exchange(loose_force_, 0) > 0) solve_again();
+        if (is_best_loose) solve_again();
         break;
       }
       if (const auto recurred = has_recurred(x, previous, setup_.newton.step_tolerance, problem_.scope_->diagonal);
@@ -436,11 +438,8 @@ class LaggedSolve {
         summary.termination = Termination::lagging;
         summary.message = fmt::format(
             "pressure or follower forces are {:.2g} of themselves off those of the positions reached, {} after {} solves; "
-            "expected "
-            "at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the forces, "
-            "may "
-            "settle "
-            "them",
+            "expected at most {:g} (/solver/advanced/lagged_load_tolerance): a smaller time step, or a stiffness with the "
+            "forces, may settle them",
             off, how, rounds, setup_.lagged_load_tolerance);
         return;
       }
