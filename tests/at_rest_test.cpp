@@ -234,9 +234,12 @@ TEST(Values, OfMaterialsThatAreNoneAreNamedWithTheirPlace) {
   };
   EXPECT_EQ(reason([](Material&) {}), "none");
   EXPECT_EQ(reason([&](Material& m) { m.youngs_modulus_at = wrong(std::nan("")); }), "E");
-  EXPECT_EQ(reason([&](Material& m) { m.youngs_modulus_at = wrong(-1); }), "E");
-  EXPECT_EQ(reason([&](Material& m) { m.poisson_ratio_at = wrong(HUGE_VAL); }), "nu");
-  EXPECT_EQ(reason([&](Material& m) { m.density_at = wrong(std::nan("")); }), "rho");
+  for (const double value : {-1.0, 0.0})
+    EXPECT_EQ(reason([&](Material& m) { m.youngs_modulus_at = wrong(value); }), "E") << value;
+  for (const double value : {-1.0, 0.5, HUGE_VAL})
+    EXPECT_EQ(reason([&](Material& m) { m.poisson_ratio_at = wrong(value); }), "nu") << value;
+  for (const double value : {0.0, std::nan("")})
+    EXPECT_EQ(reason([&](Material& m) { m.density_at = wrong(value); }), "rho") << value;
 }
 
 TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {

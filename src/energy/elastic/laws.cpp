@@ -17,6 +17,8 @@ namespace itr {
 
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
 template <int Dim>
 Vec<3> in_space(const Vec<Dim>& X) {
   Vec<3> point = Vec<3>::Zero();
@@ -68,13 +70,14 @@ EigenSystem<Dim> own_eigensystem(const Mat<Dim>& F, const OwnLaw& law) {
   return system;
 }
 
-/// The value of a function of a material at X. Throws InputError for one that is no number >= `least`.
+/// The value of a function of a material at X. Throws InputError unless it lies in (low, high), as Setup::validate asks of
+/// constants.
 template <int Dim>
-double value_at(const SpaceFunction& f, const Vec<Dim>& X, const char* name, double least) {
+double value_at(const SpaceFunction& f, const Vec<Dim>& X, const char* name, double low, double high) {
   const double value = f(in_space<Dim>(X));
-  if (std::isfinite(value) && value >= least) return value;
-  throw InputError(
-      {"", name, fmt::format("{} at ({:.6g})", value, fmt::join(X, ", ")), least < 0 ? "a number > -1" : "a number >= 0"});
+  if (low < value && value < high) return value;
+  throw InputError({"", name, fmt::format("{} at ({:.6g})", value, fmt::join(X, ", ")),
+                    fmt::format("a number of ({:g}, {:g})", low, high)});
 }
 
 }  // namespace
@@ -82,8 +85,8 @@ double value_at(const SpaceFunction& f, const Vec<Dim>& X, const char* name, dou
 template <int Dim>
 ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
-  if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0);
-  if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1);
+  if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0, kInfinity);
+  if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1, 0.5);
   return {material.law,
           {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
           material.mooney_rivlin,
@@ -92,7 +95,7 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
 
 template <int Dim>
 double mass_density(const Material& material, const Vec<Dim>& X) {
-  return material.density_at ? value_at<Dim>(material.density_at, X, "rho", 0) : material.density;
+  return material.density_at ? value_at<Dim>(material.density_at, X, "rho", 0, kInfinity) : material.density;
 }
 
 template <int Dim>
