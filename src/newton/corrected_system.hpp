@@ -4,13 +4,11 @@
 #include <Eigen/Eigenvalues>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "newton/newton.hpp"
 
 namespace itr {
-
-constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
-constexpr double kTrue = 1e-2;  ///< relative residual: the true matrix is as good as the one that was solved with
 
 /// A Newton system whose solutions are exact along motions that nothing but a small known stiffness resists: there a
 /// residual of the usual size stands for a long way.
@@ -66,6 +64,8 @@ class CorrectedSystem final : public NewtonSystem {
   /// the solution another one than that of the true matrix.
   void correct(ConstVectorView rhs, VectorView solution) const {
     constexpr int kRounds = 2;
+    constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
+    constexpr double kTrue = 1e-2;  ///< relative residual: the true matrix is as good as the one that was solved with
     if (!product_ || stiffness_.size() == 0 || !solution.allFinite()) return;
     VectorX residual(rhs.size());
     for (int round = 0; round < kRounds; ++round) {

@@ -155,7 +155,7 @@ class Direction {
     const double descent = solution.dot(rhs);  // of no minimiser of a convex model where it is not positive
     if (!(descent > 0) && !rhs.isZero(0)) return false;
     begin_step();
-    // way^T H way over all dofs, with H_ff way_f = rhs.
+    // p^T H p over all dofs, with H_ff p_f = rhs.
     const PrescribedMotion& motion = held_.motion();
     step_.curvature = descent;
     if (motion.coupling.size() > 0) step_.curvature += 2 * solution.dot(motion.coupling);

@@ -82,9 +82,9 @@ struct Task {
 /// A full step, and what the quadratic model says of it.
 struct Step {
   VectorView direction;      ///< over all dofs
-  bool is_set = false;       ///< `way` holds a step
+  bool is_set = false;       ///< `direction` holds a step
   double norm = 0;           ///< of the options
-  double curvature = 0;      ///< way^T H way
+  double curvature = 0;      ///< direction^T H direction
   bool is_of_shift = false;  ///< it is short because the Hessian was shifted, not because the end is near
 };
 
@@ -149,7 +149,7 @@ class Iterate {
     gradient.setZero();
     task_.energy.add_gradient(x, gradient, task_.workspace);
   }
-  /// Fraction of a way that is feasible.
+  /// Fraction of `direction` that is feasible.
   double free_fraction(ConstVectorView direction) const {
     const ScopedTimer timer(task_.summary.ccd_seconds);
     return task_.energy.max_step(x_, direction, task_.workspace);

@@ -48,13 +48,6 @@ double mean_vertex_area(const Mesh<Dim>& mesh) {
   return area / std::max(1, vertices);
 }
 
-template <int Dim>
-Vec<Dim> rest_center(const Mesh<Dim>& mesh, CellId c) {
-  Vec<Dim> sum = Vec<Dim>::Zero();
-  for (const int v : mesh.cell(c)) sum += mesh.rest(v);
-  return sum / (Dim + 1);
-}
-
 /// Kinetic energy at the start, and what gravity gives over the size of the scene [J]; 0 where something else feeds it.
 template <int Dim>
 double available_energy(const Setup<Dim>& setup) {
@@ -66,7 +59,7 @@ double available_energy(const Setup<Dim>& setup) {
   double energy = 0;
   for (const CellId c : mesh.live_cells()) {
     const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c);
-    const Vec<Dim> X = rest_center(mesh, c);
+    const Vec<Dim> X = mesh.barycenter(c);
     if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(box.sizes());
     for (const auto& condition : setup.initial_velocity)
       if (condition.body == mesh.body(c)) {
@@ -125,7 +118,7 @@ template <int Dim>
 std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& contact) {
   constexpr double kStrain = 1e-3;
   const double size = rest_box(setup.mesh).sizes().maxCoeff();
-  const Vec<Dim> center = rest_center(setup.mesh, 0);
+  const Vec<Dim> center = setup.mesh.barycenter(0);
   double prescribed = 0, fall = 0;
   try {
     prescribed = prescribed_speed(setup, center, kFirstSteps);

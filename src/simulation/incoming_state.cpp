@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 
-#include <memory>
 #include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
@@ -184,13 +184,6 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
                    "positions without inversions and intersections");
 }
 
-#define ITR_INSTANTIATE(Dim)                                                \
-  template Mesh<Dim> initial_mesh(const Setup<Dim>&);                       \
-  template State<Dim> initial_state(const Setup<Dim>&);                     \
-  template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
-  template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);
-ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
-
 template <int Dim>
 void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, ProblemCache<Dim>& cache) {
   SparseSystem& system = cache.system;
@@ -226,7 +219,12 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, Pro
     if (dofs.unknown[i] != kNone) a[i] = solution[dofs.unknown[i]];
 }
 
-template void set_consistent_acceleration<2>(const Setup<2>&, State<2>&, ProblemCache<2>&);
-template void set_consistent_acceleration<3>(const Setup<3>&, State<3>&, ProblemCache<3>&);
+#define ITR_INSTANTIATE(Dim)                                                \
+  template Mesh<Dim> initial_mesh(const Setup<Dim>&);                       \
+  template State<Dim> initial_state(const Setup<Dim>&);                     \
+  template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
+  template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);        \
+  template void set_consistent_acceleration(const Setup<Dim>&, State<Dim>&, ProblemCache<Dim>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -59,15 +59,13 @@ template <int Dim>
 std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
   constexpr double kLargestTurn = 1.05;  // 60 degrees
   std::map<std::array<int, Dim - 1>, std::vector<FacetId>> corners;
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
-    if (!mesh.is_facet_alive(f)) continue;
+  for (const FacetId f : mesh.live_facets())
     for (int left_out = 0; left_out < Dim; ++left_out) {
       std::array<int, Dim - 1> corner;
       for (int i = 0; i < Dim - 1; ++i) corner[i] = mesh.facet(f)[(left_out + 1 + i) % Dim];
       std::sort(corner.begin(), corner.end());
       corners[corner].push_back(f);
     }
-  }
   // In 2D along the facet, which turns as the normal does; its length is twice the area in 3D.
   const auto normal_of = [&](FacetId f) -> Vec<Dim> {
     const auto& facet = mesh.facet(f);

@@ -28,8 +28,6 @@
 
 namespace itr {
 
-namespace {}  // namespace
-
 template <int Dim>
 EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
   EdgeLengths lengths{.shortest = std::numeric_limits<double>::infinity()};

@@ -114,7 +114,7 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
     for (Eigen::Index i = 0; i < gradient.size(); i += Dim) force += gradient.segment<Dim>(i).norm() / 2;
     if (setup.body_acceleration)
       for (const CellId c : state.mesh.live_cells()) {
-        const Vec<Dim> a = setup.body_acceleration(state.mesh.rest(state.mesh.cell(c)[0]), state.t);
+        const Vec<Dim> a = setup.body_acceleration(state.mesh.barycenter(c), state.t);
         weight += setup.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) * a.norm();
       }
     const bool counts = most_elastic_ > kNoStrain * kNoStrain * stiffness(setup) && weight < kSmallWeight * force;

@@ -259,7 +259,7 @@ void ContactCandidates<Dim>::predict_motion(const CollisionSurface& surface, Con
 }
 
 /// Finds the pairs of the longest of dx, dx / 2, dx / 4, ..., not longer than this fraction of it, that has few enough of
-/// them; returns its share. Motions beyond the extent of all bodies need not be tried. Below `reach`, pairs are those of
+/// them; returns that fraction. Motions beyond the extent of all bodies need not be tried. Below `reach`, pairs are those of
 /// bodies at rest, of which none can be left out.
 template <int Dim>
 double ContactCandidates<Dim>::search_part(const CollisionSurface& surface, ConstVectorView x, ConstVectorView dx,

@@ -5,9 +5,9 @@
 // On a part of the cell, det F lies between the least and the greatest of its Bernstein coefficients b_k. Over the 2^(Dim d)
 // equal parts of d uniform refinements, with the mean m of det F over the cell, the barrier is
 //   2^-d sum over parts and k of phi(b_k / m),   phi(s) = -(s/s0 - 1)^2 ln(s/s0) where s < s0 = 0.05, else 0.
-// The barrier is infinite where a coefficient is not positive, and zero with two derivatives where none is far below the mean. The
-// weight 2^-d is that of parts along a line. Coefficients of a part bound those of its refinement, so that parts in which
-// none is below s0 m are not refined.
+// The barrier is infinite where a coefficient is not positive, and zero with two derivatives where none is far below the
+// mean. The weight 2^-d is that of parts along a line. Coefficients of a part bound those of its refinement, so that parts
+// in which none is below s0 m are not refined.
 #pragma once
 
 #include <vector>
