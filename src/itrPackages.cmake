@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# cpack -G DEB in the build folder: packages itr, libitr0, libitr-dev, itr-backends and python3-itr.
+# cpack -G DEB in the build folder: packages itr, libitr0.2, libitr-dev, itr-backends and python3-itr.
 set(CPACK_PACKAGE_NAME itr)
 set(CPACK_PACKAGE_VENDOR "ITR")
 set(CPACK_PACKAGE_CONTACT "The ITR maintainers <maintainers@localhost>")
@@ -16,6 +16,7 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
 set(CPACK_COMPONENTS_ALL command library development)
 set(version "${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE}")
+set(library libitr${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})  # named by its SONAME
 
 function(itr_package component name description)
   string(TOUPPER ${component} COMPONENT)
@@ -23,12 +24,12 @@ function(itr_package component name description)
   set(CPACK_COMPONENT_${COMPONENT}_DESCRIPTION "${description}" PARENT_SCOPE)
 endfunction()
 itr_package(command itr "In-timestep remeshing for contacting elastodynamics: the command, examples and pages")
-itr_package(library libitr0 "In-timestep remeshing for contacting elastodynamics: the shared library")
+itr_package(library ${library} "In-timestep remeshing for contacting elastodynamics: the shared library")
 itr_package(development libitr-dev "In-timestep remeshing for contacting elastodynamics: headers, static library, CMake package")
 set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS "itr-backends, python3-h5py, python3-matplotlib")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "libitr0 (= ${version}), libeigen3-dev, libtbb-dev, libfmt-dev, libhdf5-dev, libgmp-dev, libmpfr-dev, zlib1g-dev")
+  "${library} (= ${version}), libeigen3-dev, libtbb-dev, libfmt-dev, libhdf5-dev, libgmp-dev, libmpfr-dev, zlib1g-dev")
 
 get_property(modules GLOBAL PROPERTY ITR_SOLVER_MODULES)
 if(modules)

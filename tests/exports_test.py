@@ -62,8 +62,8 @@ def main():
     ]:
         if found:
             failures.append(f"{title}: {' '.join(sorted(found)[:10])}")
-    if not soname or soname.group(1) != "libitr.so.0":
-        failures.append(f"SONAME is {soname and soname.group(1)}, not libitr.so.0")
+    if not soname or soname.group(1) != "libitr.so.0.2":
+        failures.append(f"SONAME is {soname and soname.group(1)}, not libitr.so.0.2")
     print("\n".join(failures) or f"{len(functions)} functions of C, {len(symbols) - len(functions)} symbols of {len(names)} names of C++")
     return 1 if failures else 0
 

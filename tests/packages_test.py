@@ -44,10 +44,10 @@ class Packages(unittest.TestCase):
         return call("dpkg-deb", "-f", self.packages[package], name).strip()
 
     def test_each_says_what_it_needs(self):
-        self.assertLessEqual({"itr", "libitr0", "libitr-dev"}, set(self.packages))
+        self.assertLessEqual({"itr", "libitr0.2", "libitr-dev"}, set(self.packages))
         self.assertIn("libhdf5", self.field("itr", "Depends"))
-        self.assertIn("libtbb", self.field("libitr0", "Depends"))
-        self.assertRegex(self.field("libitr-dev", "Depends"), r"libitr0 \(= 0\.2\.0-1\)")
+        self.assertIn("libtbb", self.field("libitr0.2", "Depends"))
+        self.assertRegex(self.field("libitr-dev", "Depends"), r"libitr0\.2 \(= 0\.2\.0-1\)")
 
     def test_each_has_its_own_files(self):
         owner = {}
@@ -57,7 +57,7 @@ class Packages(unittest.TestCase):
                 if not path.endswith("/"):
                     self.assertNotIn(path, owner, f"in {name} and {owner.get(path)}")
                     owner[path] = name
-        ends = {"bin/itr": "itr", "doc/itr/README.md": "itr", "libitr.so.0": "libitr0", "include/itr/itr.h": "libitr-dev",
+        ends = {"bin/itr": "itr", "doc/itr/README.md": "itr", "libitr.so.0.2": "libitr0.2", "include/itr/itr.h": "libitr-dev",
                 "cmake/itr/itrConfig.cmake": "libitr-dev", "libitr.a": "libitr-dev", "libitr.so": "libitr-dev"}
         for end, name in ends.items():
             self.assertEqual([owner[path] for path in owner if path.endswith("/" + end)], [name], end)
@@ -84,9 +84,9 @@ class Packages(unittest.TestCase):
         self.assertIn(str(self.root), output)
 
     def test_a_program_links(self):
-        [library] = self.root.glob("usr/lib/**/libitr.so.0")
+        [library] = self.root.glob("usr/lib/**/libitr.so.0.2")
         name = re.search(r"SONAME\s+(\S+)", call("objdump", "-p", library))[1]
-        self.assertEqual(name, "libitr.so.0")
+        self.assertEqual(name, "libitr.so.0.2")
         program = pathlib.Path(self.folder.name) / "bounce"
         call("cc", SOURCE / "examples/api/bounce.c", "-I", self.root / "usr/include", "-L", library.parent, "-litr", "-lm",
              f"-Wl,-rpath,{library.parent}", "-o", program)

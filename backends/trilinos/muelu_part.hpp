@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A rank's fraction of a system that MueLu solves: rows of the nodes that are its own. Calls are collective over the ranks.
+// A rank's part of a system that MueLu solves: rows of the nodes that are its own. Calls are collective over the ranks.
 #pragma once
 
 #include <mpi.h>

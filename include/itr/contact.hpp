@@ -46,7 +46,7 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   /// Largest fraction of dx without impact, by conservative CCD. Positions are feasible if no pair touches. Where dx brings
   /// too many pairs into question at a time, it is walked in parts, and less of it told if these are many.
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override;
-  /// Shares of dx by vertex, from planar bounds of each pair (`planar_shares`); of its first part where it is walked in
+  /// Fractions of dx by vertex, from planar bounds of each pair; of its first part where it is walked in
   /// parts.
   bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
   /// The pairs that block a step along dx before `fraction` of it; in its first part where it is walked in parts.

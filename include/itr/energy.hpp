@@ -174,8 +174,8 @@ class ITR_EXPORT Energy {
   virtual void add_gradient_round_off(ConstVectorView x, VectorView round_off, Workspace& workspace) const;
   /// Largest a in [0, 1] such that x + s dx is feasible for all s in [0, a] (conservative).
   virtual double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const;
-  /// The motion dx with each vertex' way as long as it is feasible whatever stops others, for where max_step cuts dx short
-  /// as a whole. False where the term cannot tell; `ways` is as long as dx, and undefined then.
+  /// The motion dx with each vertex' step as long as it is feasible whatever stops others, for where max_step cuts dx short
+  /// as a whole. False where the term cannot tell; `steps` is as long as dx, and undefined then.
   virtual bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const;
   /// Adds the pairs that stop dx before `fraction` of it, and bounds the gaps of all pairs in `blocking` at its end. False
   /// where the term cannot tell.

@@ -159,9 +159,9 @@ struct ITR_EXPORT Setup : StepSetup<Dim> {
   LinearOptions linear;
 
   /// Fills in values that are left open and returns a sentence on each. A Simulation calls it.
-  /// - Activation distance 0 becomes a thousandth of the thinnest body, less where edges are short, gaps narrow or
-  /// prescribed
-  ///   motions without inertia small.
+  ///
+  /// - dhat 0 becomes a thousandth of the thinnest body. It is less where edges are short, gaps narrow, or motions that
+  ///   are prescribed without inertia small.
   /// - Friction velocity 0 becomes in dynamics a part of the speed that the scene is driven with. Without inertia each step
   ///   takes a thousandth of the largest relative motion in it, by its length.
   /// - Barrier stiffness 0 becomes a tenth of the stiffest body's modulus [Pa] in the convergent form, and its equivalent in

@@ -154,7 +154,7 @@ class ITR_EXPORT Registry {
   /// The name in this table for a name or alias of ITR or PolyFEM: "amesos2" -> "amesos2:klu2", "Eigen::SimplicialLDLT" ->
   /// "eigen:ldlt". Empty if there is no equal.
   static std::string canonical_name(const std::string& name);
-  /// Makes a solver; "auto" picks one at each analysis (choice.hpp). Throws InputError, with lists of present and absent
+  /// Makes a solver; "auto" picks one at each analysis. Throws InputError, with lists of present and absent
   /// solvers, if the name is unknown, the module does not load, an option does not exist, or MPI is needed and does not run.
   std::unique_ptr<Solver> create(const std::string& name, const SolverOptions& options = {});
   /// Makes the bare engine of a solver, without checks, residuals and refinement, to measure their cost. Null for a solver

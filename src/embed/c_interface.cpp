@@ -82,6 +82,13 @@ itr_status with(itr_model* m, F&& f) noexcept {
   if (!m) return ITR_BAD_INPUT;
   return guarded(m->message, [&] { return f(m->model); });
 }
+template <typename F>
+itr_status with_boundary(itr_simulation* s, const char* boundary, F&& f) noexcept {
+  return with(s, [&](itr::AnySimulation& simulation) {
+    require(boundary, "boundary");
+    f(simulation);
+  });
+}
 
 itr_status status_of(const itr::StepResult& result, std::string& message) {
   if (result.ok) return ITR_SUCCESS;
@@ -99,6 +106,11 @@ void copy(const std::vector<T>& values, const char* name, std::size_t length, T*
   if (length != values.size())
     throw itr::InputError({"", name, "a length of " + std::to_string(length), std::to_string(values.size())});
   copy(values, name, result);
+}
+
+void copy_resultant(const itr::AnySimulation::Resultants& sum, double* force, double* moment) {
+  copy(sum.force, "force", force);
+  copy(sum.moment, "moment", moment);
 }
 
 /// get() of the simulation, `none` without one.
@@ -249,36 +261,35 @@ ITR_ARRAY(itr_get_facet_boundaries, int, ids, facet_boundaries)
 ITR_ARRAY(itr_get_von_mises, double, von_mises, von_mises)
 ITR_ARRAY(itr_get_stress, double, stress, stress)
 
-// Loads on a boundary, by a function or by values at vertices.
-#define ITR_LOAD(SET, VALUES)                                                                                            \
-  itr_status itr_##SET(itr_simulation* simulation, const char* boundary, itr_function function, void* user) {            \
-    return with(simulation, [&](itr::AnySimulation& s) {                                                                 \
-      require(boundary, "boundary");                                                                                     \
-      s.SET(boundary, as_function(function, user));                                                                      \
-    });                                                                                                                  \
-  }                                                                                                                      \
-  itr_status itr_##SET##_values(itr_simulation* simulation, const char* boundary, size_t length, const double* VALUES) { \
-    return with(simulation, [&](itr::AnySimulation& s) {                                                                 \
-      require(boundary, "boundary");                                                                                     \
-      s.SET(boundary, array(#VALUES, VALUES, length));                                                                   \
-    });                                                                                                                  \
-  }
-ITR_LOAD(set_traction, tractions)
-ITR_LOAD(set_pressure, pressures)
-
 itr_status itr_fix(itr_simulation* simulation, const char* boundary, const int* mask, itr_function displacement,
                    void* user) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
+  return with_boundary(simulation, boundary, [&](itr::AnySimulation& s) {
     s.fix(boundary, array("mask", mask, dimension_of(simulation)), as_function(displacement, user));
   });
 }
 itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, const int* mask, size_t length,
                           const double* displacements) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    require(boundary, "boundary");
+  return with_boundary(simulation, boundary, [&](itr::AnySimulation& s) {
     s.fix(boundary, array("mask", mask, dimension_of(simulation)), array("displacements", displacements, length));
   });
+}
+itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user) {
+  return with_boundary(simulation, boundary,
+                       [&](itr::AnySimulation& s) { s.set_traction(boundary, as_function(traction, user)); });
+}
+itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                   const double* tractions) {
+  return with_boundary(simulation, boundary,
+                       [&](itr::AnySimulation& s) { s.set_traction(boundary, array("tractions", tractions, length)); });
+}
+itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user) {
+  return with_boundary(simulation, boundary,
+                       [&](itr::AnySimulation& s) { s.set_pressure(boundary, as_function(pressure, user)); });
+}
+itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, size_t length,
+                                   const double* pressures) {
+  return with_boundary(simulation, boundary,
+                       [&](itr::AnySimulation& s) { s.set_pressure(boundary, array("pressures", pressures, length)); });
 }
 itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(as_function(acceleration, user)); });
@@ -331,10 +342,6 @@ const double* itr_forces(const itr_simulation* simulation, itr_force kind) {
   if (!simulation || kind < ITR_CONTACT || kind > ITR_RESIDUAL) return nullptr;
   const itr::VectorX& forces = simulation->simulation.forces().*itr::kForcesOnBodies[kind];
   return forces.size() == 0 ? nullptr : forces.data();
-}
-static void copy_resultant(const itr::AnySimulation::Resultants& sum, double* force, double* moment) {
-  copy(sum.force, "force", force);
-  copy(sum.moment, "moment", moment);
 }
 itr_status itr_resultant(itr_simulation* simulation, const char* part, const double* about, double* force, double* moment) {
   return with(simulation, [&](itr::AnySimulation& s) {

@@ -135,7 +135,10 @@ class VtkReader {
     if (in_.peek() == "OFFSETS") {
       word();
       lists.ends = numbers(word(), in_.count(rows));
-      if (!lists.ends.empty()) lists.ends.erase(lists.ends.begin());  // the first cell begins at 0
+      if (!lists.ends.empty()) {
+        if (lists.ends[0] != 0) in_.fail("OFFSETS that begin with " + std::to_string(lists.ends[0]), "0");
+        lists.ends.erase(lists.ends.begin());
+      }
       if (word() != "CONNECTIVITY") in_.fail("no CONNECTIVITY", "it behind OFFSETS");
       lists.points = numbers(word(), in_.count(size));
     } else {

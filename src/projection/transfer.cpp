@@ -161,9 +161,9 @@ class ConstrainedMass {
     polynomials_.resize(inverse_.rows(), Dim + 1);
     for (std::size_t v = 0; v < part_.size(); ++v) {
       const Box<Dim>& box = boxes[part_[v]];
-      const Vec<Dim> motion = mesh.rest[v] - 0.5 * (box.min + box.max);
+      const Vec<Dim> offset = mesh.rest[v] - 0.5 * (box.min + box.max);
       const double size = (box.max - box.min).norm();
-      polynomials_.row(v) << 1, motion.transpose() / (size > 0 ? size : 1);
+      polynomials_.row(v) << 1, offset.transpose() / (size > 0 ? size : 1);
     }
   }
 

@@ -15,7 +15,7 @@ const Edit<Dim>& no_edit() {
   return none;
 }
 
-/// A cell after an edit at present positions. Without inertia `way` is 0.
+/// A cell after an edit at present positions. Without inertia `step` is 0.
 template <int Dim>
 PlacedCell<Dim> place(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const PotentialTerms<Dim>& terms,
                       const CurvedCell<Dim>& cell, const Edit<Dim>& edit) {

@@ -110,7 +110,7 @@ class ContactCandidates {
   bool replace_pairs_of_strays(const CollisionSurface& surface, std::size_t most);
 
   bool holds_ = false;       ///< false where pairs were too many
-  std::size_t at_rest_ = 0;  ///< the most pairs of a kind that a search without a limit has found since foresee()
+  std::size_t at_rest_ = 0;  ///< the most pairs of a kind that a search without a limit has found since predict_motion()
   const CollisionSurface* surface_ = nullptr;
   int revision_ = 0;             ///< of the surface
   double searched_ = 0;          ///< reach of the last search [m]

@@ -42,17 +42,17 @@ double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, 
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;
   PotentialTerms<Dim> terms = context;
-  terms.loads = {};                                                 // they complete squares
-  std::vector<double> energy(mesh.node_slots(), context.coupling);  // by part
+  terms.loads = {};  // they complete squares
+  std::vector<double> of_part(mesh.node_slots(), context.coupling);
   for (const CellId c : mesh.live_cells()) {
     PlacedCell<Dim> cell = place(mesh, fields, terms, cell_before(mesh, c), no_edit<Dim>());
     if (!fields.levels.empty()) cell.level = fields.levels[c];
     cell.step.colwise() -= fall;
     CellModel<Dim> model(terms, mesh.part(c));
     model.add(cell, mesh.body(c));
-    energy[mesh.part(c)] += model.energy();
+    of_part[mesh.part(c)] += model.energy();
   }
-  return *std::max_element(energy.begin(), energy.end());
+  return *std::max_element(of_part.begin(), of_part.end());
 }
 
 template <int Dim>

@@ -27,6 +27,7 @@ inline constexpr int kMostGenerations = 3;
 /// Change of a refusal key by which a refusal no longer holds.
 inline constexpr double kSameKey = 1.2;
 
+/// Memory of operations during one call of the remesher; refusals also from step to step.
 template <int Dim>
 class SessionMemory {
  public:
