@@ -220,6 +220,20 @@ class Refusals(unittest.TestCase):
         self.assertTrue(places)
         self.assertLessEqual(set(places), named)
 
+    def test_rows_of_keys_have_columns_that_are_read(self):
+        read = set(re.findall(r'(?:text|row\.value)\("(\w+)"', (SOURCE / "src/scene/key_table.cpp").read_text()))
+        rows = json.loads((SOURCE / "src/scene/keys.json").read_text())["keys"]
+        self.assertEqual({column for row in rows for column in row}, read)
+
+
+class Embedding(unittest.TestCase):
+    def test_what_was_renamed_has_another_name(self):
+        section = (SOURCE / "docs/embedding.md").read_text().partition("\n## From 0.1 to 0.2\n")[2]
+        rows = [re.findall(r"`(?:\w+::)?(\w+)`", cell) for line in section.splitlines() if line.startswith("| `")
+                for cell in line.split("|")[1:3]]
+        for before, after in zip(rows[::2], rows[1::2]):
+            self.assertFalse(set(before) & set(after), before)
+
 
 if __name__ == "__main__":
     unittest.main()

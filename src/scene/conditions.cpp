@@ -101,7 +101,9 @@ class ConditionReader {
       if (points.size() < 2 || factor["extend"].string("").starts_with("repeat")) continue;
       const double begin = times().front(), end = times().back();
       const double shared = std::min(end, points.back()) - std::max(begin, points.front());
-      if (shared < kLeastFraction * (points.back() - points.front()))
+      const double last = end + setup_.time.dt / 2;  // times of steps are rounded
+      const auto met = std::count_if(points.begin(), points.end(), [&](double t) { return t >= begin && t <= last; });
+      if (met < 2 && shared < kLeastFraction * (points.back() - points.front()))
         warnings_.push_back(fmt::format("{}: the points go from {} to {}, the run from {} to {}: it hardly meets them",
                                         factor["points"].pointer(), units.text(points.front(), "s"),
                                         units.text(points.back(), "s"), units.text(begin, "s"), units.text(end, "s")));

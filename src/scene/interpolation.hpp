@@ -6,6 +6,7 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "node.hpp"
@@ -100,6 +101,7 @@ class Interpolation {
     const Eigen::VectorXd m = Eigen::SparseLU<Eigen::SparseMatrix<double>>(matrix).solve(right);
     curvature_.assign(m.data(), m.data() + n);
   }
+  /// Evaluates g on [points_i, points_i+1].
   double inside(double t, std::size_t i) const {
     if (kind_ == Kind::piecewise_constant) return values_[i];
     const double h = points_[i + 1] - points_[i];
@@ -107,7 +109,7 @@ class Interpolation {
     const double line = a * values_[i] + b * values_[i + 1];
     if (kind_ == Kind::piecewise_linear) return line;
     return line + h * h / 6 * ((a * a * a - a) * curvature_[i] + (b * b * b - b) * curvature_[i + 1]);
-  }  ///< on [points_i, points_i+1]
+  }
   double slope(double t, std::size_t i) const {
     if (kind_ == Kind::piecewise_constant) return 0;
     const double h = points_[i + 1] - points_[i];

@@ -118,13 +118,13 @@ bool transform(std::vector<Vec<Dim>>& points, const Node& geometry) {
 }
 
 void warn_of_radians(const Node& transformation, std::vector<std::string>& warnings) {
-  constexpr double kPart = std::numbers::pi / 12, kRounding = 1e-4;
+  constexpr double kPart = std::numbers::pi / 12, kWhole = 24, kRounding = 1e-4;
   const Node rotation = transformation["rotation"];
   const Node mode = transformation["rotation_mode"];
   if (!rotation.exists() || (mode.exists() && mode.json() == "quaternion")) return;
   for (const Node& angle : rotation.items()) {
     const double parts = std::abs(angle.number(0)) / kPart;
-    if (parts < 0.5 || std::abs(parts - std::round(parts)) > kRounding * parts) continue;
+    if (parts < 0.5 || parts > kWhole + 0.5 || std::abs(parts - std::round(parts)) > kRounding * parts) continue;
     warnings.push_back(rotation.pointer() + ": " + abbreviate(rotation.json()) + " is a part of pi: are angles in degrees?");
     return;
   }

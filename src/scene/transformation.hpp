@@ -19,7 +19,7 @@ Box<Dim> bounding_box(const std::vector<Vec<Dim>>& points);
 template <int Dim>
 bool transform(std::vector<Vec<Dim>>& points, const Node& geometry);
 
-/// Asks about angles that are parts of pi: rotations are in degrees.
+/// Asks about angles up to a whole turn that are parts of pi: rotations are in degrees.
 void warn_of_radians(const Node& transformation, std::vector<std::string>& warnings);
 
 }  // namespace itr::scene

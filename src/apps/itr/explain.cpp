@@ -204,14 +204,12 @@ class Explanation {
   }
 
   std::string solver(const linear::MatrixTraits& matrix) const {
-    std::string asked;
-    for (const auto& name : setup_.linear.solvers) asked += (asked.empty() ? "" : ", ") + name;
     std::string name = simulation_.solver_name();
     if (name == "auto") {
       const linear::Pick pick = linear::pick_solver(matrix, registry_);
       name = pick.name + ", " + pick.reason;
     }
-    return fmt::format("{} (asked for: {})", name, asked);
+    return fmt::format("{} (asked for: {})", name, fmt::join(setup_.linear.solvers, ", "));
   }
 
   /// Surfaces and which of them can meet; what is near at the start.
@@ -230,10 +228,9 @@ class Explanation {
     if (setup_.proxy) fmt::print("  a collision mesh touches in place of the bodies' boundary\n");
     fmt::print("  {} surface vertices, {} edges", surface.vertices.size(), surface.edges.size());
     if (Dim == 3) fmt::print(", {} triangles", surface.triangles.size());
-    const double dhat = setup_.contact.dhat;
     Workspace workspace;
     const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
-    fmt::print("; d-hat {}, {} pairs nearer than that at the start\n", setup_.units.text(dhat, "m"),
+    fmt::print("; d-hat {}, {} pairs nearer than that at the start\n", setup_.units.text(setup_.contact.dhat, "m"),
                energy.active(x, workspace).size());
   }
 

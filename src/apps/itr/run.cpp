@@ -292,9 +292,12 @@ class Run {
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
     const bool is_finished = outcome == kFinished;
+    const Setup<Dim>& setup = simulation_.setup();
     if (is_finished) fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
-    if (is_finished) tell_remeshing();
-    count_warnings();
+    if (is_finished && setup.remesh.enabled)
+      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices()));
+    if (const int count = writer_->warnings(); count > 0)
+      spdlog::warn("{} warning{}: see above, or summary.json in {}", count, count == 1 ? "" : "s", directory_);
     if (with_report_) write_report();
     if (is_finished) return done;
     fmt::print(stderr, "itr: {}; {}\n", outcome, advice);
@@ -302,16 +305,6 @@ class Run {
   }
 
  private:
-  void tell_remeshing() const {
-    const Setup<Dim>& setup = simulation_.setup();
-    if (setup.remesh.enabled)
-      fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices()));
-  }
-  void count_warnings() const {
-    if (const int count = writer_->warnings(); count > 0)
-      spdlog::warn("{} warning{}: see above, or summary.json in {}", count, count == 1 ? "" : "s", directory_);
-  }
-
   static constexpr const char* kFinished = "finished";
   static constexpr std::chrono::milliseconds kLook{100};  ///< between looks at what a signal said
   static constexpr double kGrace = 5;                     ///< for a step that is to be dropped [s]

@@ -61,7 +61,7 @@ struct EncodedFrame {
   std::string bytes;                                    ///< displacements and fields, compressed
 };
 
-/// Encodes frames one after another, each by itself: displacements as 16-bit shares of their box in this frame, fields as
+/// Encodes frames one after another, each by itself: displacements as 16-bit fractions of their box in this frame, fields as
 /// 16-bit logarithms, all in the order of the ids.
 class FrameEncoder {
  public:
