@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "core/parallel.hpp"
+#include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "itr/core.hpp"
@@ -497,6 +498,11 @@ int run(const RunOptions& options) {
   if (!scene.defaults.information.empty()) spdlog::info("{}", scene.defaults.information);
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
   const ThreadLimit limit(threads);
+  if (const int ranks = this_launch().ranks, cores = available_cores();
+      ranks > 1 && ranks - 1 + threads > cores && threads > 0)
+    warnings.add(
+        fmt::format("{} ranks, of which the first has {} threads, on {} cores: they wait for each other (--threads)", ranks,
+                    threads, cores));
   linear::Registry registry;
   registry.allow_mpi_start();
   return std::visit(
