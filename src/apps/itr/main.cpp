@@ -149,8 +149,8 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   const fs::path program = fs::canonical("/proc/self/exe");
   std::string folder = (program.parent_path() / ITR_PROGRAMS_FOLDER / name).lexically_normal().string();
   if (!fs::exists(folder))
-    throw InputError({folder, "", "no such folder",
-                      fmt::format("the Python program of `itr {}`, installed beside the command", name)});
+    throw InputError(
+        {folder, "", "no such folder", fmt::format("the Python program of `itr {}`, installed beside the command", name)});
   std::string self = program.string(), modules;
   if (name == "study") {  // its runs find the program and its modules even if files are replaced while it runs
     if (const int file = open("/proc/self/exe", O_RDONLY); file >= 0) self = fmt::format("/proc/{}/fd/{}", getpid(), file);
@@ -216,7 +216,8 @@ int dispatch(int argc, char** argv) {
   apart->add_option("reference", reference, "result folder of the run to compare with")->required();
   apart->add_flag("--last", last_only, "at the last time that both have stored alone (default: at all of them)");
   app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
-  app.add_subcommand("sweep", "runs of a scene with other values, for GNU parallel or a job array, and their results in a table");
+  app.add_subcommand("sweep",
+                     "runs of a scene with other values, for GNU parallel or a job array, and their results in a table");
   check_command(app, argc, argv);
   if (const std::string name = argc > 1 ? argv[1] : ""; name == "study" || name == "sweep") {
     check_single_rank();
