@@ -9,6 +9,7 @@
 #include "itr/core.hpp"
 #include "scene/expression.hpp"
 #include "scene/interpolation.hpp"
+#include "scene/node.hpp"
 
 namespace itr::scene {
 namespace {
@@ -45,6 +46,37 @@ TEST(Expression, Functions) {
   EXPECT_EQ(evaluate("pi() - pi"), 0);
   EXPECT_TRUE(Expression("1e6 / 16").is_constant());
   EXPECT_FALSE(Expression("0 * t").is_constant());
+}
+
+TEST(Expression, KnowsItsKinksInTime) {
+  const auto kinks = [](const std::string& text) { return Expression(text).kinks(0, 10); };
+  EXPECT_EQ(kinks("3 * t + sin(t)"), std::vector<double>{});
+  EXPECT_EQ(kinks("x + y"), std::vector<double>{});
+  EXPECT_EQ(kinks("if(t - 2.5, 1, t)"), std::vector<double>{2.5});
+  EXPECT_EQ(kinks("min(t, 4) + max(0, t - 7)"), (std::vector<double>{4, 7}));
+  EXPECT_EQ(kinks("0.3 * smoothstep((t - 1) / 0.5)").size(), 2u);
+  EXPECT_NEAR(kinks("abs(1 - t)").at(0), 1, 1e-12);
+  EXPECT_EQ(kinks("floor(t / 3)"), (std::vector<double>{3, 6, 9}));
+  EXPECT_EQ(kinks("t % 4"), (std::vector<double>{4, 8}));
+  EXPECT_EQ(kinks("compare(t, 5) * compare(t, 5.004)").size(), 2u) << "within one sample";
+  // Where the place decides too, nothing is known; what is beside it is.
+  EXPECT_EQ(kinks("if(t - x, 1, 0)"), std::vector<double>{});
+  EXPECT_EQ(kinks("x * if(t - 2, 1, 0) + (t, x) + (y, t - 1)"), std::vector<double>{2});
+  EXPECT_EQ(kinks("if(x * 0 + if(t - 2, 1, -1), 1, 0)"), std::vector<double>{2});
+}
+
+TEST(Interpolation, KnowsItsKinks) {
+  const auto kinks = [](const json& value) {
+    const Document document{.file = {}, .root = {}, .json = value};
+    return Interpolation(Node(document)).kinks(0, 10);
+  };
+  EXPECT_EQ(kinks({{"type", "none"}}), std::vector<double>{});
+  EXPECT_EQ(kinks({{"type", "linear_ramp"}, {"from", 1}, {"to", 3}}), (std::vector<double>{1, 3}));
+  const json table = {{"type", "piecewise_linear"}, {"points", {0, 1, 4}}, {"values", {0, 1, 0}}};
+  EXPECT_EQ(kinks(table), (std::vector<double>{0, 1, 4}));
+  json wave = table;
+  wave["extend"] = "repeat";
+  EXPECT_EQ(kinks(wave), (std::vector<double>{0, 1, 4, 4, 5, 8, 8, 9, 12}));
 }
 
 TEST(Expression, RefusesWhatItDoesNotKnow) {

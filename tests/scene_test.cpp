@@ -337,6 +337,33 @@ TEST_F(SceneTest, ForcesAreComparedWithThoseThatActUnlessAScenesSaysOtherwise) {
   EXPECT_EQ(read2(square({{"solver", {{"nonlinear", {{"force_tol", 1e-6}}}}}})).newton.force_tolerance, 1e-6);
 }
 
+TEST_F(SceneTest, StepsMayBeChosenByTheirErrors) {
+  const json condition = {{"id", 1},
+                          {"value", json::array({"if(t - 0.25, 1, 0)", 0})},
+                          {"interpolation", {{"type", "linear_ramp"}, {"from", 0.5}, {"to", 7}}}};
+  const auto scene = [&](const json& time) {
+    json all = {{"dt", "auto"}, {"tend", 2}};
+    all.update(time);
+    return square({{"time", all}, {"boundary_conditions", {{"dirichlet_boundary", json::array({condition})}}}});
+  };
+  const itr::TimeOptions time = read2(scene({{"t0", 1e-3}, {"output_dt", 0.5}, {"tolerance", 0.02}})).time;
+  EXPECT_TRUE(time.adaptive.enabled);
+  EXPECT_EQ(time.adaptive.tolerance, 0.02);
+  EXPECT_EQ(time.adaptive.begin, 1e-3);
+  EXPECT_EQ(time.adaptive.end, 2);
+  EXPECT_EQ(time.adaptive.kinks, (std::vector<double>{0.25, 0.5}));
+  EXPECT_NEAR(time.dt * time.steps, 2 - 1e-3, 1e-12);
+  EXPECT_EQ(read_scene(scene({{"output_dt", 0.5}})).output.times.output_dt, 0.5);
+  const auto place = [&](const json& changes) { return failure(scene(changes)).place; };
+  EXPECT_EQ(place({{"tend", nullptr}, {"time_steps", 10}}), "/time/tend");
+  EXPECT_EQ(place({{"time_steps", 10}}), "/time/time_steps");
+  EXPECT_EQ(place({{"integrator", "BDF3"}}), "/time/integrator");
+  EXPECT_EQ(place({{"tolerance", 0}}), "/time/tolerance");
+  EXPECT_EQ(place({{"dt_min", 0.1}, {"dt_max", 0.01}}), "/time/dt_max");
+  EXPECT_EQ(wrong_place({{"time", {{"tolerance", 0.1}}}}), "/time/tolerance");
+  EXPECT_EQ(wrong_place({{"time", {{"output_dt", 0.1}}}}), "/time/output_dt");
+}
+
 /// At times and places that were not looked at when the scene was read.
 TEST_F(SceneTest, ValuesThatAreNoneNameKeyPlaceAndTimeWhereTheyAreAsked) {
   const auto parts_of = [](const auto& ask) {

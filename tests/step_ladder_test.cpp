@@ -75,6 +75,24 @@ TEST(StepLadder, ChoosesTheNextAttemptByTheFailure) {
     EXPECT_EQ(ladder.next(rows[i].attempt, rows[i].failure), rows[i].next) << "row " << i;
 }
 
+TEST(StepLadder, TakesAnAdaptiveStepAgainFromTheTopAndShorter) {
+  const StepLadder ladder{.least_part = 0.1}, at_least{.least_part = 0.9};
+  StepFailure inaccurate{Kind::inaccurate, "", {}, false};
+  inaccurate.trial = {.length = 0.4, .part = 0.4, .error = 9};
+  const Attempt straight{.straightening = kAround, .remeshing = kNoRemeshing}, top{.trial = inaccurate.trial};
+  EXPECT_EQ(ladder.next(straight, inaccurate), top);
+  for (const StepFailure* failure : {&kUnsolved, &kCreates, &kNotStraight}) {
+    Attempt from = top;
+    from.straightening = kLast;
+    EXPECT_EQ(ladder.next(from, *failure), (Attempt{.trial = {.length = 0.1, .part = 0.25}}));
+  }
+  EXPECT_EQ(ladder.next(top, kInverted), (Attempt{.straightening = kAround, .trial = inaccurate.trial}));
+  EXPECT_EQ(ladder.next(top, kRemeshed), (Attempt{.remeshing = kNoRemeshing, .trial = inaccurate.trial}));
+  // As short as it may be: implicit Euler takes what would create energy.
+  EXPECT_FALSE(at_least.next(top, kUnsolved));
+  EXPECT_EQ(at_least.next(top, kCreates), (Attempt{.method = implicit_euler, .trial = inaccurate.trial}));
+}
+
 TEST(StepLadder, EndsWhateverFails) {
   for (const StepFailure* failure : {&kUnsolved, &kInverted, &kCreates, &kNotStraight}) {
     const StepLadder ladder{.most_halvings = 3};

@@ -85,9 +85,22 @@ struct MomentumChange {
 /// Adds changes by body.
 ITR_EXPORT void add_changes(const std::vector<MomentumChange>& changes, double factor, std::vector<MomentumChange>& sum);
 
+/// Trial of an adaptive step that was taken again with a shorter one.
+struct RejectedStep {
+  double dt = 0;       ///< of the trial [s]
+  double error = 0;    ///< its local error, a part of the energy norm; not finite where there is no solution to tell it
+  std::string reason;  ///< "error in time", "impact", or why no solution was found
+};
+
 struct ITR_EXPORT StepReport {
   int step = 0;
-  double t = 0;  ///< [s]
+  double t = 0;   ///< [s]
+  double dt = 0;  ///< length, where steps are adaptive [s]; else 0
+  /// Local error of an adaptive step, in the energy norm, by that of the largest energy so far (docs/theory.md, "Adaptive
+  /// time"). Its sum over the run estimates the error in time at its end.
+  double time_error = 0;
+  int rejected_steps = 0;                ///< adaptive: trials that were taken again with a shorter step
+  std::vector<RejectedStep> rejections;  ///< these, in their order
   int vertices = 0, elements = 0, unknowns = 0;
   int newton_iterations = 0;
   int linear_solves = 0;      ///< systems of the whole mesh: Newton's, and those of the safe projection

@@ -101,6 +101,22 @@ inline constexpr int kElasticDegree = 2;  ///< exact for products of two gradien
 
 enum class Integrator { implicit_euler, newmark, bdf };
 
+/// Steps whose lengths follow from their errors (docs/theory.md, "Adaptive time").
+struct AdaptiveTimeOptions {
+  bool enabled = false;
+  double tolerance = 0.01;    ///< of the energy norm: what a period of a free oscillation may add, about
+  double dt_min = 0;          ///< errors shorten no step below it [s]
+  double dt_max = 0;          ///< [s]
+  double begin = 0, end = 1;  ///< of the run [s]
+  double output_dt = 0;  ///< frames and forces are asked for at its multiples after `begin`, and at `end` [s]; 0: always
+  std::vector<double> kinks{};  ///< where functions of time are not smooth [s], ascending: steps end there
+  double step_end = 0;          ///< of the step that is being taken [s]
+
+  /// The next time after t at which a step has to end [s]; infinity after the end.
+  double next_stop(double t) const;
+  bool is_asked(double t) const;  ///< whether frames and forces are asked for at the time t of a step's end
+};
+
 struct TimeOptions {
   Integrator integrator = Integrator::implicit_euler;
   int bdf_order = 2;           ///< 1..6, for Integrator::bdf
@@ -117,13 +133,18 @@ struct TimeOptions {
   /// A step whose solve fails is cut into two of half its length, and these again, so many times; 0: the simulation stops.
   /// In BDF and Newmark the smaller steps are of implicit Euler, and BDF's order grows again from 1 after them.
   int step_cuts = 0;
-  double t0 = 0;       ///< [s]
-  double dt = 1;       ///< h [s]
-  int steps = 1;       ///< number of steps
-  int first_step = 0;  ///< after which it is t0: steps after it have the length dt, those before it had others
+  double t0 = 0;                   ///< [s]
+  double dt = 1;                   ///< h [s]
+  int steps = 1;                   ///< number of steps
+  int first_step = 0;              ///< after which it is t0: steps after it have the length dt, those before it had others
+  AdaptiveTimeOptions adaptive{};  ///< where it is enabled dt and steps say nothing about steps to come
 
   bool has_inertia() const { return !quasistatic && !is_static; }
-  double time_after(int step) const { return t0 + (step - first_step) * dt; }  ///< [s]
+  double time_after(int step) const {  ///< [s]
+    return adaptive.enabled && step == first_step + 1 ? adaptive.step_end : t0 + (step - first_step) * dt;
+  }
+  /// Whether a run that has taken so many steps, to the time t, is at its end.
+  bool is_over(int step, double t) const { return adaptive.enabled ? t >= adaptive.end : step >= steps; }
 };
 
 // Newton.
@@ -277,7 +298,9 @@ struct OutputOptions {
   double checkpoint_period =
       30;            ///< least time between checkpoints, from which a run can be resumed [s]; 0: every stored step
   bool vtu = false;  ///< stored frames as VTU files too
-  Units units{};     ///< of all that is written but checkpoints
+  /// Adaptive steps: with output_dt, frames and rows of forces are stored at these times, whatever skip_frames.
+  AdaptiveTimeOptions times{};
+  Units units{};  ///< of all that is written but checkpoints
 };
 
 }  // namespace itr

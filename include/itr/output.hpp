@@ -113,8 +113,8 @@ class ITR_EXPORT Writer {
   /// How many files of an earlier run, or of steps after the saved state, were removed.
   int removed_files() const;
 
-  /// Whether it is time for the next stored step to be a checkpoint.
-  bool is_checkpoint_due(int step) const;
+  /// Whether the step to the time t [s] is stored, and it is time for a checkpoint.
+  bool is_checkpoint_due(int step, double t) const;
   /// Stores the step's line always; the frame if its step is due, or if there is a `checkpoint`, the state to be saved.
   /// `report.seconds.output` is what the caller measured for the *previous* call's writing, so the caller passes it in.
   template <int Dim>

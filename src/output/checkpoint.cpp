@@ -23,7 +23,8 @@ constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";
 constexpr const char* kQuadratureLevels = "/checkpoint/quadrature_levels";
 constexpr const char* kChordLevels = "/checkpoint/chord_levels";
-constexpr const char* kDoublings = "/checkpoint/doublings";  ///< of flat obstacles
+constexpr const char* kStepControl = "/checkpoint/step_control";  ///< StepControl and History::dt, of adaptive steps
+constexpr const char* kDoublings = "/checkpoint/doublings";       ///< of flat obstacles
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -278,6 +279,16 @@ linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
   return factor;
 }
 
+template <int Dim>
+void read_step_control(const fs::path& path, const hdf5::File& file, State<Dim>& state) {
+  const std::vector<double> control = file.read_doubles(kStepControl).values;
+  if (control.size() != 4 ||
+      !std::all_of(control.begin(), control.end(), [](double c) { return c >= 0 && std::isfinite(c); }))
+    throw InputError({path.string(), kStepControl, std::to_string(control.size()) + " numbers", "4, none of them negative"});
+  state.control = {control[0], control[1], control[2]};
+  state.history.dt = control[3];
+}
+
 }  // namespace
 
 template <int Dim>
@@ -316,6 +327,8 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
              std::array{stiffness.value, stiffness.largest, stiffness.previous_squared_distance}, 0);
   file.write("/checkpoint/energy_guard",
              std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
+  if (const StepControl& control = state.control; control.dt > 0)
+    file.write(kStepControl, std::array{control.dt, control.error, control.energy, state.history.dt}, 0);
   write_memory(file, state.remesh_memory);
   write_strata(file, state.strata, state.mesh.num_vertices());
   write_factor(file, state.factor);
@@ -390,6 +403,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.created_energy = guard[0];
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
+  if (file.contains(kStepControl)) read_step_control(saved.file, file, state);
   state.remesh_memory = read_memory(saved.file, file, state.mesh.num_vertices());
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "core/hdf5.hpp"
 #include "itr/core.hpp"
@@ -69,17 +70,29 @@ Json to_json(const std::vector<MomentumChange>& changes) {
   return json;
 }
 
-template <typename Value>
-bool is_there(const Value&) {
-  return true;
+/// Trials that an adaptive step replaced.
+Json to_json(const std::vector<RejectedStep>& rejections) {
+  Json json;
+  for (const RejectedStep& step : rejections)
+    json.push_back({{"dt", to_json(step.dt)}, {"error", to_json(step.error)}, {"reason", step.reason}});
+  return json;
 }
-bool is_there(const std::vector<MomentumChange>& changes) { return !changes.empty(); }
+
+template <typename Value>
+bool is_there(const Value& value, unsigned shown) {
+  if constexpr (std::is_arithmetic_v<Value>)
+    return !(shown & if_any) || value != 0;
+  else if constexpr (requires { value.empty(); })
+    return !value.empty();
+  else
+    return true;
+}
 
 /// Adds the fields of `report` that are shown there.
 void add_fields(const StepReport& report, unsigned shown, Json& json) {
   for_each_field(kStepFields, [&](const auto& field) {
     const auto& value = report.*field.member;
-    if ((field.shown & shown) && is_there(value)) json[field.name] = to_json(value);
+    if ((field.shown & shown) && is_there(value, field.shown)) json[field.name] = to_json(value);
   });
 }
 
@@ -135,8 +148,9 @@ template <typename Fields, typename Whole>
 void read_fields(const Fields& fields, const Json& json, Whole& whole);
 void from_json(const Json& json, EnergyReport& energy) { read_fields(kEnergyFields, json, energy); }
 void from_json(const Json& json, StepSeconds& seconds) { read_fields(kSecondsFields, json, seconds); }
-/// Reads nothing: momentum by body is in no total.
+/// Reads nothing: momentum by body and rejected trials are in no total.
 void from_json(const Json&, std::vector<MomentumChange>&) {}
+void from_json(const Json&, std::vector<RejectedStep>&) {}
 
 template <typename Fields, typename Whole>
 void read_fields(const Fields& fields, const Json& json, Whole& whole) {

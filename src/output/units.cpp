@@ -31,6 +31,7 @@ StepReport in_units(StepReport report, const Units& units) {
   };
   for_each_field(kStepFields, [&](const auto& field) { convert(report, field); });
   for_each_field(kEnergyFields, [&](const auto& field) { convert(report.energy, field); });
+  for (RejectedStep& step : report.rejections) step.dt = units.from_si(step.dt, "s");
   const double momentum = units.factor("kg m/s"), angular = units.factor("kg m^2/s");
   for (MomentumChange& change : report.remeshing) {
     for (double& value : change.linear) value /= momentum;

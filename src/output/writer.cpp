@@ -85,7 +85,9 @@ struct Writer::Impl {
   }
 
   static std::string frame_name(int step) { return fmt::format("frames/{:06}.h5", step); }
-  bool is_due(int step) const { return step % std::max(options.skip_frames, 1) == 0; }
+  bool is_due(int step, double t) const {
+    return options.times.output_dt > 0 ? options.times.is_asked(t) : step % std::max(options.skip_frames, 1) == 0;
+  }
 
   /// Seconds of all steps become those of the whole run so far, and of what it was resumed from.
   void count_wall_time() {
@@ -95,7 +97,7 @@ struct Writer::Impl {
   /// A state that was saved at a step which is not to be stored gives way to the next frame: a run that was interrupted
   /// leaves what one that was not leaves.
   void drop_unasked_frame() {
-    if (last_stored < 0 || is_due(last_stored)) return;
+    if (last_stored < 0 || is_last_due) return;
     series.drop_last();
     fs::remove(directory / frame_name(last_stored));
     if (vtu_series && fs::remove(directory / vtu_name(last_stored))) vtu_series->drop_last();
@@ -120,7 +122,7 @@ struct Writer::Impl {
       last_checkpoint = seconds_now();
     } else {
       frames.write(directory / name, frame, step, t, options.units);
-      if (!first_unsynced) first_unsynced = step;
+      unsynced.push_back(step);
     }
   }
 
@@ -130,6 +132,7 @@ struct Writer::Impl {
     if (step == last_stored) return;
     drop_unasked_frame();
     last_stored = step;
+    is_last_due = is_due(step, t);
     std::vector<std::string> asked;
     if (frame.asked) {
       const NodalForces& forces = frame.asked->forces;
@@ -148,14 +151,13 @@ struct Writer::Impl {
 
   /// Brings frames to the disk before the checkpoint that relies on them.
   void sync_frames() {
-    constexpr int kFew = 32;
-    const int every = std::max(options.skip_frames, 1);
-    if (first_unsynced && last_stored - *first_unsynced > kFew * every)
+    constexpr std::size_t kFew = 32;
+    if (unsynced.size() > kFew)
       sync_file_system(directory / "frames");
-    else if (first_unsynced)
-      for (int step = *first_unsynced; step <= last_stored; step += every) sync(directory / frame_name(step));
+    else
+      for (const int step : unsynced) sync(directory / frame_name(step));
     sync(directory / "steps.jsonl");
-    first_unsynced.reset();
+    unsynced.clear();
   }
 
   Folder folder;
@@ -163,6 +165,7 @@ struct Writer::Impl {
   OutputOptions options;
   RunInfo info;
   int last_stored = kNone;
+  bool is_last_due = true;  ///< whether its frame was asked for
   int removed_files = 0;
   std::vector<FrameEntry> stored;  ///< while the series are begun
   LineFile steps;
@@ -173,8 +176,8 @@ struct Writer::Impl {
   Totals totals;
   DisplacementNorms norms;
   WarningList warnings;
-  double seconds_before = 0;          ///< of the runs before --resume
-  std::optional<int> first_unsynced;  ///< step of the first frame that may not be on the disk
+  double seconds_before = 0;  ///< of the runs before --resume
+  std::vector<int> unsynced;  ///< steps of frames that may not be on the disk
   double last_checkpoint = 0;
 };
 
@@ -192,14 +195,15 @@ Writer::Writer(Folder folder, OutputOptions options, RunInfo info, const Checkpo
   impl_->seconds_before = impl_->totals.report().seconds.total;
   const State<Dim>& state = *checkpoint.state;
   impl_->norms = displacement_norms(state.mesh, state.history.x[0]);
+  impl_->is_last_due = impl_->is_due(state.step, state.t);
 }
 
 Writer::~Writer() = default;
 
 int Writer::removed_files() const { return impl_->removed_files; }
 
-bool Writer::is_checkpoint_due(int step) const {
-  return impl_->is_due(step) && (step == 0 || seconds_now() - impl_->last_checkpoint >= impl_->options.checkpoint_period);
+bool Writer::is_checkpoint_due(int step, double t) const {
+  return impl_->is_due(step, t) && (step == 0 || seconds_now() - impl_->last_checkpoint >= impl_->options.checkpoint_period);
 }
 
 template <int Dim>
@@ -210,15 +214,16 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
   if (Json warnings = impl_->warnings.take_new(); !warnings.empty()) line["warnings"] = std::move(warnings);
   impl_->steps.append(text_of(line));
   if (frame.asked && !frame.asked->curves.empty()) impl_->folder.claim(kForceFile);
-  if (frame.asked) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
+  const bool has_forces = frame.asked && impl_->options.times.is_asked(report.t);
+  if (has_forces) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x);
-  if (!checkpoint && !impl_->is_due(report.step)) return;
+  if (!checkpoint && !impl_->is_due(report.step, report.t)) return;
   try {
     impl_->store(frame, report.step, report.t, checkpoint);
   } catch (const InputError&) {
     impl_->steps.shorten(length);  // a step whose frame is not there was not done
-    if (frame.asked && !frame.asked->curves.empty()) impl_->forces.drop_last();
+    if (has_forces && !frame.asked->curves.empty()) impl_->forces.drop_last();
     throw;
   }
   impl_->index(frame, report.step, report.t);

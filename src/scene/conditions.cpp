@@ -64,6 +64,7 @@ class ConditionReader {
     const ValueFunction<Dim> value = read_function<Dim>(rhs, -1);
     if (value.is_zero) return;
     check_defined<Dim>(value.function, all_vertices(), times(), rhs);
+    end_steps_at_kinks(rhs, rhs["interpolation"]);
     setup_.body_acceleration = value.function;
   }
 
@@ -92,6 +93,15 @@ class ConditionReader {
     };
   }
 
+  /// Steps whose lengths are chosen end where values are not smooth in time.
+  void end_steps_at_kinks(const Node& value, const Node& interpolation) {
+    AdaptiveTimeOptions& adaptive = setup_.time.adaptive;
+    if (!adaptive.enabled) return;
+    for (const double kink : find_kinks(value, interpolation, adaptive.begin, adaptive.end)) adaptive.kinks.push_back(kink);
+    std::sort(adaptive.kinks.begin(), adaptive.kinks.end());
+    adaptive.kinks.erase(std::unique(adaptive.kinks.begin(), adaptive.kinks.end()), adaptive.kinks.end());
+  }
+
   /// Asks about points in time that the run does not come to: a wrong unit of time looks like that.
   void warn_of_interpolation(const Node& interpolation) {
     constexpr double kLeastFraction = 0.01;
@@ -116,6 +126,7 @@ class ConditionReader {
       warn_of_interpolation(node["interpolation"]);
       warn_of_components(node["value"], Dim, warnings_);
       const Function function = read_value(node);
+      end_steps_at_kinks(node["value"], node["interpolation"]);
       warn_of_components(node["dimension"], Dim, warnings_);
       const std::array<bool, Dim> components = read_components(node["dimension"]);
       const bool is_free = std::none_of(components.begin(), components.end(), [](bool b) { return b; });
@@ -145,6 +156,7 @@ class ConditionReader {
       warn_of_interpolation(node["interpolation"]);
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
+      end_steps_at_kinks(node["value"], node["interpolation"]);
       for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
@@ -158,6 +170,7 @@ class ConditionReader {
     for (const Node& node : boundary_["pressure_boundary"].items()) {
       warn_of_interpolation(node["interpolation"]);
       const ScalarFunction<Dim> value = read_scalar_function<Dim>(node["value"], node["interpolation"]);
+      end_steps_at_kinks(node["value"], node["interpolation"]);
       const Function as_vector = [f = value.function](const Vec<Dim>& X, double t) {
         return Vec<Dim>::Constant(f(X, t)).eval();
       };
@@ -233,6 +246,7 @@ class ConditionReader {
       if (moved.empty()) continue;
       check_defined<Dim>(value.function, moved, times(), node["value"]);
       obstacles.motions.push_back(value.function);
+      end_steps_at_kinks(node["value"], node["interpolation"]);
     }
   }
 

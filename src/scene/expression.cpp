@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "expression.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "core/quoted.hpp"
 
@@ -83,6 +85,19 @@ constexpr Function kFunctions[] = {
     {"tan", 1, [](const double* a) { return std::tan(a[0]); }},
     {"tanh", 1, [](const double* a) { return std::tanh(a[0]); }},
 };
+
+/// Which smooth piece of a function its arguments are on; 0 where it has one.
+double piece_of(std::string_view name, const double* a) {
+  const auto sign = [](double value) { return value > 0 ? 1.0 : (value < 0 ? -1.0 : 0.0); };
+  if (name == "if") return a[0] >= 0;
+  if (name == "compare" || name == "min" || name == "max") return a[0] < a[1];
+  if (name == "abs" || name == "sign") return sign(a[0]);
+  if (name == "floor" || name == "fac") return std::floor(a[0]);
+  if (name == "ceil") return std::ceil(a[0]);
+  if (name == "smoothstep") return (a[0] > 0) + (a[0] >= 1);
+  if (name == "half_smoothstep") return (a[0] > -1) + (a[0] >= 1);
+  return 0;
+}
 
 bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -260,59 +275,103 @@ class ExpressionParser {
 
 Expression::Expression(std::string_view text) { ExpressionParser(text, *this).parse(); }
 
+/// Does one instruction on the stack whose end is `top`.
+void Expression::apply(const Instruction& instruction, const Variables& variables, double*& top) {
+  switch (instruction.code) {
+    case Code::number:
+      *top++ = instruction.number;
+      break;
+    case Code::x:
+      *top++ = variables.x;
+      break;
+    case Code::y:
+      *top++ = variables.y;
+      break;
+    case Code::z:
+      *top++ = variables.z;
+      break;
+    case Code::t:
+      *top++ = variables.t;
+      break;
+    case Code::negate:
+      top[-1] = -top[-1];
+      break;
+    case Code::add:
+      --top, top[-1] += top[0];
+      break;
+    case Code::subtract:
+      --top, top[-1] -= top[0];
+      break;
+    case Code::multiply:
+      --top, top[-1] *= top[0];
+      break;
+    case Code::divide:
+      --top, top[-1] /= top[0];
+      break;
+    case Code::modulo:
+      --top, top[-1] = std::fmod(top[-1], top[0]);
+      break;
+    case Code::power:
+      --top, top[-1] = std::pow(top[-1], top[0]);
+      break;
+    case Code::drop:
+      --top;
+      break;
+    case Code::call:
+      top -= instruction.arity;
+      *top = kFunctions[instruction.function].call(top);
+      ++top;
+      break;
+  }
+}
+
 double Expression::operator()(const Variables& variables) const {
   std::array<double, kStackOnFrame> on_frame;
   std::vector<double> on_heap(depth_ > kStackOnFrame ? static_cast<std::size_t>(depth_) : 0);
   double* top = on_heap.empty() ? on_frame.data() : on_heap.data();  // one past the last number
-  for (const Instruction& instruction : program_) {
-    switch (instruction.code) {
-      case Code::number:
-        *top++ = instruction.number;
-        break;
-      case Code::x:
-        *top++ = variables.x;
-        break;
-      case Code::y:
-        *top++ = variables.y;
-        break;
-      case Code::z:
-        *top++ = variables.z;
-        break;
-      case Code::t:
-        *top++ = variables.t;
-        break;
-      case Code::negate:
-        top[-1] = -top[-1];
-        break;
-      case Code::add:
-        --top, top[-1] += top[0];
-        break;
-      case Code::subtract:
-        --top, top[-1] -= top[0];
-        break;
-      case Code::multiply:
-        --top, top[-1] *= top[0];
-        break;
-      case Code::divide:
-        --top, top[-1] /= top[0];
-        break;
-      case Code::modulo:
-        --top, top[-1] = std::fmod(top[-1], top[0]);
-        break;
-      case Code::power:
-        --top, top[-1] = std::pow(top[-1], top[0]);
-        break;
-      case Code::drop:
-        --top;
-        break;
-      case Code::call:
-        top -= instruction.arity;
-        *top = kFunctions[instruction.function].call(top);
-        ++top;
-        break;
-    }
-  }
+  for (const Instruction& instruction : program_) apply(instruction, variables, top);
   return top[-1];
+}
+
+std::vector<double> Expression::pieces_at(double t) const {
+  std::vector<double> stack(static_cast<std::size_t>(depth_)), pieces;
+  std::vector<char> is_of_space(stack.size());
+  double* top = stack.data();
+  for (const Instruction& instruction : program_) {
+    const auto before = top - stack.data();
+    const auto first = instruction.code == Code::call ? before - instruction.arity : before - 2;
+    const bool is_function = instruction.code == Code::call || instruction.code == Code::modulo;
+    if (is_function &&
+        std::none_of(is_of_space.begin() + first, is_of_space.begin() + before, [](char c) { return c != 0; }))
+      pieces.push_back(instruction.code == Code::modulo ? std::trunc(stack[first] / stack[first + 1])
+                                                        : piece_of(kFunctions[instruction.function].name, &stack[first]));
+    apply(instruction, {.t = t}, top);
+    if (instruction.code == Code::drop) continue;
+    const auto after = top - stack.data();  // the newest number depends on what it is made of
+    const bool is_new = instruction.code == Code::x || instruction.code == Code::y || instruction.code == Code::z;
+    const bool is_made = std::any_of(is_of_space.begin() + std::min(after - 1, before), is_of_space.begin() + before,
+                                     [](char c) { return c != 0; });
+    is_of_space[after - 1] = is_new || is_made;
+  }
+  return pieces;
+}
+
+std::vector<double> Expression::kinks(double begin, double end) const {
+  constexpr int kSamples = 1000;
+  std::vector<double> found;
+  if (!uses_time_) return found;
+  std::vector<double> pieces = pieces_at(begin);
+  for (int i = 1; i <= kSamples; ++i) {
+    double low = begin + (end - begin) * (i - 1) / kSamples,
+           high = i == kSamples ? end : begin + (end - begin) * i / kSamples;
+    std::vector<double> next = pieces_at(high);
+    if (next == pieces) continue;
+    for (double middle = std::midpoint(low, high); low < middle && middle < high; middle = std::midpoint(low, high))
+      (pieces_at(middle) == pieces ? low : high) = middle;
+    found.push_back(high);
+    pieces = std::move(next);
+  }
+  return found;
 }
 
 }  // namespace itr::scene

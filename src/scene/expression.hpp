@@ -28,6 +28,9 @@ class Expression {
   double operator()(const Variables& variables) const;
   bool is_constant() const { return !uses_space_ && !uses_time_; }
   bool uses_time() const { return uses_time_; }
+  /// Times between these two at which it, or a derivative up to the second, may jump: where a condition, a sign or a whole
+  /// number that depends on t alone changes. Of two changes within a thousandth of the way the first may be missed.
+  std::vector<double> kinks(double begin, double end) const;
 
  private:
   friend class ExpressionParser;
@@ -38,6 +41,10 @@ class Expression {
     int function = 0;  ///< index into the table of functions
     double number = 0;
   };
+
+  static void apply(const Instruction& instruction, const Variables& variables, double*& top);
+  /// Which piece of each piecewise function of t alone is taken at t.
+  std::vector<double> pieces_at(double t) const;
 
   std::vector<Instruction> program_;
   int depth_ = 0;  ///< most numbers on the stack at a time

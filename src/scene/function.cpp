@@ -155,6 +155,20 @@ ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpol
           false};
 }
 
+std::vector<double> find_kinks(const Node& value, const Node& interpolation, double begin, double end) {
+  const double unit = value.document().units.factor("s");
+  std::vector<double> found;
+  const auto add = [&](const std::vector<double>& kinks, double factor) {
+    for (const double kink : kinks)
+      if (const double t = factor * kink; t > begin && t < end) found.push_back(t);
+  };
+  for (const Node& component : value.items())
+    if (component.json().is_string()) add(parse_expression(component).kinks(begin / unit, end / unit), unit);
+  for (const Node& factor : interpolation.without_units().items())
+    add(Interpolation(factor).kinks(begin / unit, end / unit), unit);
+  return found;
+}
+
 template <int Dim>
 void check_defined(const SpaceTimeFunction<Dim>& function, const std::vector<Vec<Dim>>& points,
                    const std::vector<double>& times, const Node& value) {

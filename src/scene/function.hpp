@@ -28,6 +28,10 @@ ValueFunction<Dim> read_function(const Node& value, double sign = 1);
 template <int Dim>
 ValueFunction<Dim> read_function(const Node& value, const Node& interpolation);
 
+/// Times from `begin` to `end` [s] at which such a value, or scalar value, is not smooth, as far as that follows from t
+/// alone.
+std::vector<double> find_kinks(const Node& value, const Node& interpolation, double begin, double end);
+
 /// One component of the latter: `value` is a number or an expression.
 template <int Dim>
 struct ScalarFunction {

@@ -51,6 +51,18 @@ class Interpolation {
     return inside(t, static_cast<std::size_t>(after - points_.begin()) - 1);
   }
   bool is_one() const { return kind_ == Kind::none; }
+  /// Times between these two at which g is not smooth: ends of a ramp and points, of all periods.
+  std::vector<double> kinks(double begin, double end) const {
+    if (kind_ == Kind::linear_ramp) return {from_, to_};
+    std::vector<double> found = points_;
+    const bool repeats = extend_ == Extend::repeat || extend_ == Extend::repeat_offset;
+    const double period = points_.empty() ? 0 : points_.back() - points_.front();
+    if (!repeats || period == 0) return found;
+    found.clear();
+    for (double turn = std::floor((begin - points_.front()) / period); points_.front() + turn * period <= end; ++turn)
+      for (const double point : points_) found.push_back(point + turn * period);
+    return found;
+  }
 
  private:
   void read_points(const Node& node) {

@@ -41,6 +41,27 @@ void read_integrator(const Node& node, TimeOptions& options) {
   if (options.newmark_gamma > 1) node["gamma"].fail("a number of (0, 1]");
 }
 
+/// Steps that are chosen by their errors between t0 and tend. Where a length or a number of steps is asked for before the
+/// run, it is a thousandth of the run, and a thousand.
+void read_adaptive_steps(const Node& time, TimeOptions& options) {
+  constexpr int kNominalSteps = 1000;
+  constexpr double kLeast = 1e-7, kMost = 0.1;  // of the run
+  AdaptiveTimeOptions& adaptive = options.adaptive;
+  adaptive.enabled = true;
+  if (!time.has("tend")) time["tend"].fail("the end of the run, beside dt \"auto\"");
+  if (time.has("time_steps")) time["time_steps"].fail("no number of steps beside dt \"auto\"");
+  adaptive.begin = options.t0;
+  adaptive.end = time["tend"].number(0);
+  const double duration = adaptive.end - adaptive.begin;
+  adaptive.tolerance = time["tolerance"].positive(adaptive.tolerance);
+  adaptive.dt_min = time["dt_min"].positive(kLeast * duration);
+  adaptive.dt_max = time["dt_max"].positive(kMost * duration);
+  if (adaptive.dt_max < adaptive.dt_min) time["dt_max"].fail("a number >= dt_min");
+  if (time.has("output_dt")) adaptive.output_dt = time["output_dt"].positive(0);
+  options.steps = kNominalSteps;
+  options.dt = std::clamp(duration / kNominalSteps, adaptive.dt_min, adaptive.dt_max);
+}
+
 /// Two of tend, dt, time_steps; a third must agree with them.
 void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>& warnings) {
   const Node tend = time["tend"], dt = time["dt"], steps = time["time_steps"];
@@ -51,6 +72,9 @@ void read_steps(const Node& time, TimeOptions& options, std::vector<std::string>
   if (found.size() < 2) time.fail(abbreviate(found), "two of tend, dt and time_steps");
   if (tend.exists() && !(tend.number(0) > options.t0))
     tend.fail(fmt::format("a time after t0 = {:g}", units.from_si(options.t0, "s")));
+  if (dt.exists() && dt.json() == "auto") return read_adaptive_steps(time, options);
+  for (const char* key : {"tolerance", "dt_min", "dt_max", "output_dt"})
+    if (time.has(key)) time[key].fail("it with dt \"auto\" only");
   const double duration = tend.number(0) - options.t0;
   options.steps = steps.integer_at_least(1, 1);
   options.dt = dt.exists() ? dt.positive(1) : duration / options.steps;
@@ -112,6 +136,8 @@ TimeOptions read_time(const Node& root, std::vector<std::string>& warnings) {
   if (options.step_cuts > kMostCuts) time["step_cuts"].fail("at most " + std::to_string(kMostCuts));
   read_steps(time, options, warnings);
   read_integrator(time["integrator"], options);
+  if (options.adaptive.enabled && options.integrator == Integrator::bdf && options.bdf_order > 2)
+    time["integrator"].fail("BDF1 or BDF2 beside dt \"auto\"");
   return options;
 }
 
@@ -346,6 +372,7 @@ std::vector<DampingOptions> read_damping(const Node& root, const TimeOptions& ti
     const Node stiffness = node["stiffness"], ratio = node["stiffness_ratio"];
     if (stiffness.exists() == ratio.exists()) node.fail(abbreviate(node.json()), "one of stiffness and stiffness_ratio");
     const double h = time.dt;
+    if (ratio.exists() && time.adaptive.enabled) ratio.fail("stiffness beside /time/dt \"auto\": a ratio is by dt");
     options.coefficient = stiffness.exists() ? stiffness.non_negative(0) : 0.75 * ratio.non_negative(0) * h * h * h;
     options.lagging_rounds = node["lagging_iterations"].integer_at_least(1, 1);
     if (options.coefficient > 0) damping.push_back(options);

@@ -145,7 +145,8 @@ namespace {
 /// With dt given, tend and time_steps only say how many steps there are.
 Change::Of kind_of_change(const std::string& path, bool has_step) {
   if (path == "/time/tend" || path == "/time/time_steps") return has_step ? Change::Of::length : Change::Of::scene;
-  for (const char* prefix : {"/solver", "/space/remesh", "/time/step_cuts"})
+  for (const char* prefix :
+       {"/solver", "/space/remesh", "/time/step_cuts", "/time/tolerance", "/time/dt_min", "/time/dt_max"})
     if (path.starts_with(prefix)) return Change::Of::solving;
   return Change::Of::scene;
 }
@@ -201,6 +202,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
     scene.setup = read_setup<2>(root, geometries, files, scene.parts, scene.warnings);
   else
     scene.setup = read_setup<3>(root, geometries, files, scene.parts, scene.warnings);
+  std::visit([&](const auto& setup) { scene.output.times = setup.time.adaptive; }, scene.setup);
   return scene;
 }
 

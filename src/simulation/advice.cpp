@@ -428,7 +428,7 @@ void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
     const Material& m = setup.materials.at(body);
     speed = std::max(speed, std::sqrt((m.lame_lambda(Dim) + 2 * m.lame_mu()) / m.density));
   }
-  if (!has_waves(setup, figures, speed)) return;
+  if (setup.time.adaptive.enabled || !has_waves(setup, figures, speed)) return;
   const Units& units = setup.units;
   const double dt = setup.time.dt;
   words.push_back(fmt::format(

@@ -31,6 +31,9 @@ template <typename Value>
 void add(const Value& before, Value& sum) {
   sum += before;
 }
+void add(const std::vector<RejectedStep>& before, std::vector<RejectedStep>& sum) {
+  sum.insert(sum.begin(), before.begin(), before.end());
+}
 void add(const std::vector<MomentumChange>& before, std::vector<MomentumChange>& sum) { add_changes(before, 1, sum); }
 
 }  // namespace

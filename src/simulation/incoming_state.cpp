@@ -83,8 +83,12 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
     refuse_state("saved positions", std::to_string(history.x.size()) + " past states",
                  fmt::format("1 to {}, as the integrator remembers", integrator.depth()));
   require_size("past states of saved velocities", history.v.size(), history.x.size());
-  require_size("past states of saved accelerations", history.a.size(),
-               integrator.uses_acceleration() ? history.x.size() : 0);
+  if (setup.time.adaptive.enabled && history.a.size() > static_cast<std::size_t>(integrator.acceleration_depth()))
+    refuse_state("saved accelerations", std::to_string(history.a.size()) + " past states",
+                 fmt::format("at most {}, as adaptive steps remember", integrator.acceleration_depth()));
+  if (!setup.time.adaptive.enabled || (integrator.uses_acceleration() && history.a.empty()))
+    require_size("past states of saved accelerations", history.a.size(),
+                 integrator.uses_acceleration() ? history.x.size() : 0);
   const auto size =
       static_cast<std::size_t>(Dim) * (static_cast<std::size_t>(state.mesh.num_nodes()) + setup.obstacles.rest.size());
   const auto check = [&](const std::string& name, const VectorX& field) {

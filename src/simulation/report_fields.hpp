@@ -16,6 +16,7 @@ enum Shown : unsigned {
   in_step = 1,     ///< a line of steps.jsonl
   in_summary = 2,  ///< summary.json
   in_program = 4,  ///< the dictionary of Python
+  if_any = 8,      ///< not in files where it is 0
   in_files = in_step | in_summary,
   everywhere = in_files | in_program
 };
@@ -59,6 +60,10 @@ inline constexpr std::tuple kSecondsFields{
 inline constexpr std::tuple kStepFields{
     ReportField{"step", &StepReport::step, AddUp::last, "", in_step | in_program},
     ReportField{"t", &StepReport::t, AddUp::last, "s", in_step | in_program},
+    ReportField{"dt", &StepReport::dt, AddUp::last, "s", in_step | in_program | if_any},
+    ReportField{"time_error", &StepReport::time_error, AddUp::sum, "", everywhere | if_any},
+    ReportField{"rejected_steps", &StepReport::rejected_steps, AddUp::sum, "", everywhere | if_any},
+    ReportField{"rejections", &StepReport::rejections, AddUp::sum, "", in_step},
     ReportField{"order", &StepReport::order, AddUp::last, "", in_step | in_program},
     ReportField{"cut_steps", &StepReport::cut_steps, AddUp::sum, "", in_step | in_program},
     ReportField{"vertices", &StepReport::vertices, AddUp::last, "", everywhere},

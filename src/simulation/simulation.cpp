@@ -93,13 +93,16 @@ struct Simulation<Dim>::Impl {
     return end;
   }
 
-  /// f() with steps of this length. Where it does nothing the length and what belongs to it are as before.
+  /// f() with steps of this length, which is not adapted. Where it does nothing the length and what belongs to it are as
+  /// before.
   template <typename F>
   StepResult with_step(double dt, F&& f) {
     const TimeOptions time_before = setup.time;
+    setup.time.adaptive.enabled = false;
     const int step_before = state->step;
     std::shared_ptr<const State<Dim>> longer;  // of the history that another step cuts
     const auto put_back = [&] {
+      setup.time.adaptive.enabled = time_before.adaptive.enabled;
       if (state->step != step_before) return;  // it was done before a listener threw
       if (longer) change_to(std::make_shared<State<Dim>>(*longer));
       if (setup.time.dt == time_before.dt) return;
@@ -110,6 +113,7 @@ struct Simulation<Dim>::Impl {
       longer = set_step(dt);
       StepResult result = f();
       if (!result.ok) put_back();
+      setup.time.adaptive.enabled = time_before.adaptive.enabled;
       return result;
     } catch (...) {
       put_back();
@@ -226,6 +230,20 @@ struct Simulation<Dim>::Impl {
     return change_to(std::move(shorter));
   }
 
+  /// Begins an adaptive step: chooses its length, as far as it is not rejected.
+  void choose_step() {
+    TimeOptions& time = setup.time;
+    const State<Dim>& now = *state;
+    const bool has_ratio = time.integrator == Integrator::bdf && now.history.x.size() > 1;
+    const StepController::Next next =
+        StepController(time).next(now.control, now.t, first_dt, has_ratio ? now.history.dt : 0);
+    time.t0 = now.t;
+    time.first_step = now.step;
+    time.dt = next.dt;
+    time.adaptive.step_end = next.end;
+    scale_tolerances();
+  }
+
   void scale_tolerances() {
     if (setup.newton.norm != NewtonNorm::euclidean || setup.time.is_static) return;
     const double factor = setup.time.dt / first_dt;
@@ -317,6 +335,7 @@ template <int Dim>
 StepResult Simulation<Dim>::advance() {
   impl_->refuse_in_callback("step");
   impl_->complete_conditions();
+  if (impl_->setup.time.adaptive.enabled) impl_->choose_step();
   if (impl_->setup.on_iteration) report();
   StepResult result;
   std::shared_ptr<const State<Dim>> before;
@@ -328,6 +347,7 @@ StepResult Simulation<Dim>::advance() {
     if (!result.ok) return result;
     before = impl_->change_to(std::move(end));
   }
+  if (result.report.dt > 0) impl_->setup.time.dt = result.report.dt;  // the trials before may have been longer
   impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
   impl_->report = result.report;
@@ -387,7 +407,7 @@ void Simulation<Dim>::restore(const State<Dim>& state) {
 
 template <int Dim>
 bool Simulation<Dim>::finished() const {
-  return impl_->state->step >= impl_->setup.time.steps;
+  return impl_->setup.time.is_over(impl_->state->step, impl_->state->t);
 }
 
 template <int Dim>

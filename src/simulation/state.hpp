@@ -13,6 +13,7 @@
 #include "newton/newton.hpp"
 #include "remesh/memory.hpp"
 #include "time/integrator.hpp"
+#include "time/step_control.hpp"
 
 namespace itr {
 
@@ -33,6 +34,7 @@ struct State {
   linear::FactorRecord factor;  ///< factor that may serve the next step
   VectorX deviation;            ///< x - x-hat of the last step, where the next one begins [m]; empty before the first
   std::vector<int> doublings;   ///< how often each of Obstacles::flats was made twice as large; empty: none was
+  StepControl control;          ///< of adaptive steps
   double stored_energy = 0;     ///< largest elastic and contact energy at the end of a step so far [J]
   double created_energy = 0;    ///< balance of Newmark's steps, see StepProblem::created_energy [J]
 };

@@ -118,17 +118,20 @@ class StepSolver {
  public:
   /// The first solve starts at `x_start`; empty: at the positions before. It must settle what is lagged if the step may be
   /// cut.
-  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, StepMethod method, const VectorX& x_start, bool may_cut)
+  StepSolver(const StepTools<Dim>& tools, const State<Dim>& before, const Attempt& attempt, const VectorX& x_start,
+             bool may_cut)
       : tools_(tools),
         setup_(tools.setup),
         before_(before),
         next_(before),
         x_(x_start),
         guard_(tools.setup, before),
-        must_settle_(may_cut && tools.setup.lagging_tolerance > 0) {
+        must_settle_(may_cut && tools.setup.lagging_tolerance > 0),
+        is_of_setup_(attempt.method == StepMethod::of_setup),
+        trial_(attempt.trial) {
     next_.step = before.step + 1;
     next_.t = setup_.time.time_after(next_.step);
-    next_.history.damp_next = method == StepMethod::implicit_euler;
+    next_.history.damp_next = !is_of_setup_;
     report_.step = next_.step;
     report_.t = next_.t;
     report_.order = TimeIntegrator(setup_.time).accuracy(next_.history);
@@ -171,6 +174,11 @@ class StepSolver {
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
     next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
+    if (setup_.time.adaptive.enabled) {
+      report_.dt = setup_.time.dt;
+      report_.time_error = errors_.error;
+      next_.control = StepController(setup_.time).after(before_.control, errors_, trial_, setup_.time.dt, energy_);
+    }
     next_.factor = tools_.solver.record();
     next_.stiffness = problem_->stiffness();
     next_.quadrature = problem_->quadrature_levels();
@@ -204,6 +212,12 @@ class StepSolver {
   /// Ends a step that has failed.
   StepResult drop(const StepFailure& failure) {
     clock_.tell(report_);
+    if (setup_.time.adaptive.enabled) {
+      const bool is_error = failure.kind == StepFailure::Kind::inaccurate;
+      report_.rejected_steps = 1;
+      report_.rejections = {
+          {setup_.time.dt, is_error ? errors_.error : std::numeric_limits<double>::quiet_NaN(), failure.reason}};
+    }
     StepResult result{.ok = false, .reason = failure.reason, .report = report_, .forces = {}, .renumbering = {}};
     result.cancelled = failure.kind == StepFailure::Kind::cancelled;
     return result;
@@ -241,6 +255,7 @@ class StepSolver {
       if (std::string reason = find_violation(setup_, next_, x_); !reason.empty())
         return StepFailure{.kind = StepFailure::Kind::unsolved, .reason = std::move(reason), .nearly_inverted = {}};
     if (!guard_.allows(*problem_, next_.history, x_)) return forbidden();
+    if (auto failure = find_inaccuracy()) return failure;
     if (!setup_.remesh.enabled) return std::nullopt;
     {
       const ScopedTimer timer(report_.seconds.assembly);
@@ -251,6 +266,29 @@ class StepSolver {
     next_.quadrature = problem_->quadrature_levels();
     first_.emplace(next_, x_, std::move(problem_));
     return std::nullopt;
+  }
+
+  /// Judges an adaptive step by its errors in time, on the mesh before it.
+  std::optional<StepFailure> find_inaccuracy() {
+    if (!setup_.time.adaptive.enabled) return std::nullopt;
+    const ScopedTimer timer(report_.seconds.assembly);
+    const auto phase = ScopedPhase::coarse("error in time");
+    const TimeErrors found = problem_->time_errors(next_.history, x_, first_summary_.iterations > 0);
+    energy_ = found.energy;
+    const double largest = std::max({before_.control.energy, energy_, problem_->energy_resolution()});
+    errors_ = {.error = std::isfinite(found.local) ? std::sqrt(found.local / largest) : 0,
+               .impact = found.impact / largest,
+               .resolving_dt = found.resolving_dt,
+               .way_to_contact = found.way_to_contact};
+    if (!is_of_setup_) return std::nullopt;
+    const StepController controller(setup_.time);
+    const auto shorter = controller.shorter(errors_, trial_, setup_.time.dt, report_.order);
+    if (!shorter) return std::nullopt;
+    const bool is_impact = shorter->error == 0;
+    return StepFailure{.kind = StepFailure::Kind::inaccurate,
+                       .reason = is_impact ? "impact" : "error in time",
+                       .nearly_inverted = {},
+                       .trial = *shorter};
   }
 
   void go_back_to_first_solve() {
@@ -345,7 +383,10 @@ class StepSolver {
   VectorX expected() const {
     if (!setup_.time.has_inertia()) return {};
     VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
-    if (next_.deviation.size() == x.size()) x += next_.deviation;
+    if (setup_.time.adaptive.enabled && !next_.history.a.empty())
+      x += TimeIntegrator(setup_.time).scaling(next_.history) * next_.history.a[0];  // steps may differ in length
+    else if (next_.deviation.size() == x.size())
+      x += next_.deviation;
     return x;
   }
 
@@ -462,6 +503,10 @@ class StepSolver {
   std::unique_ptr<StepProblem<Dim>> problem_;
   EnergyGuard<Dim> guard_;
   bool must_settle_;  ///< rounds of lagging, or the step is cut
+  bool is_of_setup_;  ///< the integrator that takes it
+  StepTrial trial_;   ///< of an adaptive step, and its errors
+  StepErrors errors_;
+  double energy_ = 0;  ///< at its end [J]
   MeshRenumbering renumbering_;
   StepReport report_;
   NewtonSummary first_summary_;
@@ -503,6 +548,7 @@ StartOfStep<Dim> straighten(const StepTools<Dim>& tools, Straightening where, co
 
 /// Says that the step is taken by `next`. Straightening and cuts say so themselves: they tell more.
 void tell(const Attempt& next, const StepFailure& failure, int step, const Logger& logger) {
+  if (failure.kind == StepFailure::Kind::inaccurate) return;
   std::string what = "Newmark would create energy here, implicit Euler takes this step";
   if (failure.kind == StepFailure::Kind::remeshed_unsolved)
     what = (next.remeshing == Remeshing::none ? "keeping the mesh as it was" : "remeshed again without curving edges") +
@@ -523,7 +569,9 @@ void add_dropped(StepReport dropped, StepReport& report) {
 template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,
                      Attempt attempt) {
-  const StepLadder ladder{.most_halvings = start ? 0 : tools.setup.time.step_cuts};
+  const TimeOptions& time = tools.setup.time;
+  StepLadder ladder{.most_halvings = start || time.adaptive.enabled ? 0 : time.step_cuts};
+  if (time.adaptive.enabled) ladder.least_part = time.adaptive.dt_min / time.dt;
   StartOfStep<Dim> from;
   std::optional<StepSolver<Dim>> solver;
   StepFailure failure;
@@ -536,8 +584,8 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
     if (from.straightening != Straightening::none && !from.renumbering) {
       failure.kind = StepFailure::Kind::nothing_straightened;
     } else {
-      const bool may_cut = attempt.halvings < ladder.most_halvings;
-      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt.method, from.x, may_cut);
+      const bool may_cut = attempt.halvings < ladder.most_halvings || ladder.least_part < 1;
+      if (!solver) solver.emplace(tools, from.renumbering ? from.state : before, attempt, from.x, may_cut);
       auto now = solver->solve(attempt.remeshing);
       if (!now) break;
       failure = std::move(*now);
@@ -550,10 +598,12 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
       failed = std::move(dropped);
       solver.reset();
     }
-    if (!next || next->halvings > attempt.halvings) {
+    if (!next || next->halvings > attempt.halvings || next->trial.length < attempt.trial.length) {
       add_dropped(std::move(from.effort), failed.report);
       failed.report.forget_operations();
-      return next ? take_step_in_halves(tools, before, after, *next, std::move(failed)) : failed;
+      if (!next) return failed;
+      return next->halvings > attempt.halvings ? take_step_in_halves(tools, before, after, *next, std::move(failed))
+                                               : take_shorter_step(tools, before, after, start, *next, std::move(failed));
     }
     attempt = *next;
   }

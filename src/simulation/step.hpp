@@ -39,6 +39,11 @@ template <int Dim>
 StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after,
                                const Attempt& attempt, StepResult failed);
 
+/// Takes the adaptive step whose attempts have ended with `failed` as a shorter one, of a part of its length.
+template <int Dim>
+StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,
+                             const Attempt& attempt, StepResult failed);
+
 /// Adds the effort of an attempt whose state is dropped: its operations led nowhere.
 void add_dropped(StepReport dropped, StepReport& report);
 

@@ -5,6 +5,8 @@ namespace itr {
 
 namespace {
 
+constexpr double kShorter = 0.25;  ///< part that is tried next where an adaptive step has no solution
+
 /// The top of the ladder of a step of this length.
 Attempt first_attempt(int halvings) {
   return {.halvings = halvings, .method = halvings > 0 ? StepMethod::implicit_euler : StepMethod::of_setup};
@@ -14,13 +16,21 @@ Attempt first_attempt(int halvings) {
 
 std::optional<Attempt> StepLadder::next(const Attempt& attempt, const StepFailure& failure) const {
   Attempt next = attempt;
+  const auto shortened = [&](const StepTrial& trial) {
+    next = first_attempt(0);
+    next.trial = trial;
+    return next;
+  };
   switch (failure.kind) {
     case StepFailure::Kind::cancelled:
       return std::nullopt;
     case StepFailure::Kind::remeshed_unsolved:
       next.remeshing = failure.has_new_curves ? Remeshing::without_new_curves : Remeshing::none;
       return next;
+    case StepFailure::Kind::inaccurate:
+      return shortened(failure.trial);
     case StepFailure::Kind::creates_energy:
+      if (least_part <= kShorter) break;
       if (attempt.method == StepMethod::implicit_euler) break;
       next.method = StepMethod::implicit_euler;
       next.remeshing = Remeshing::with_new_curves;
@@ -29,9 +39,11 @@ std::optional<Attempt> StepLadder::next(const Attempt& attempt, const StepFailur
     case StepFailure::Kind::nothing_straightened:
       if (failure.nearly_inverted.empty() || attempt.straightening == Straightening::at_any_volume) break;
       next = first_attempt(attempt.halvings);
+      next.trial = attempt.trial;
       next.straightening = static_cast<Straightening>(static_cast<int>(attempt.straightening) + 1);
       return next;
   }
+  if (least_part <= kShorter) return shortened(attempt.trial.shortened(kShorter));
   if (attempt.halvings == most_halvings) return std::nullopt;
   return first_attempt(attempt.halvings + 1);
 }

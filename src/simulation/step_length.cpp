@@ -136,7 +136,7 @@ template <int Dim>
 void find_long_steps(const Setup<Dim>& setup, double size, const Vec<Dim>& center, std::vector<std::string>& found) {
   constexpr double kDetour = 0.5;  ///< of a wave that has less than three steps a period
   const TimeOptions& time = setup.time;
-  if (time.is_static) return;
+  if (time.is_static || time.adaptive.enabled) return;
   const std::string dt = "dt = " + setup.units.text(time.dt, "s", 6);
   for (const Prescribed& prescribed : all_prescribed(setup, center)) {
     Detour detour;

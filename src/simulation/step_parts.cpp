@@ -11,6 +11,15 @@ namespace itr {
 
 namespace {
 
+/// Newton's tolerances go with the length of the step where they are Euclidean.
+template <int Dim>
+void scale_tolerances(StepSetup<Dim>& setup, double factor) {
+  if (setup.newton.norm != NewtonNorm::euclidean || setup.time.is_static) return;
+  setup.newton.step_tolerance *= factor;
+  setup.newton.gradient_tolerance *= factor;
+  setup.newton.first_gradient_tolerance *= factor;
+}
+
 /// The step from `state` on as two of half its length.
 template <int Dim>
 StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
@@ -20,11 +29,7 @@ StepSetup<Dim> halved(const StepSetup<Dim>& setup, const State<Dim>& state) {
   half.time.dt = setup.time.dt / 2;
   half.time.steps = 2;
   if (half.time.integrator == Integrator::bdf) half.time.integrator = Integrator::implicit_euler;
-  if (half.newton.norm == NewtonNorm::euclidean && !half.time.is_static) {  // tolerances go with the step
-    half.newton.step_tolerance /= 2;
-    half.newton.gradient_tolerance /= 2;
-    half.newton.first_gradient_tolerance /= 2;
-  }
+  scale_tolerances(half, 0.5);
   return half;
 }
 
@@ -109,6 +114,24 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
   return whole;
 }
 
+template <int Dim>
+StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,
+                             const Attempt& attempt, StepResult failed) {
+  StepSetup<Dim> shorter = tools.setup;
+  TimeOptions& time = shorter.time;
+  time.dt *= attempt.trial.part;
+  time.adaptive.step_end = time.t0 + time.dt;
+  scale_tolerances(shorter, attempt.trial.part);
+  const StepTools<Dim> tools_of_shorter{shorter, tools.initial_edges, tools.cache, tools.solver, tools.logger};
+  StepResult result = take_step<Dim>(tools_of_shorter, before, after, start, attempt);
+  add_dropped(std::move(failed.report), result.report);
+  return result;
+}
+
+template StepResult take_shorter_step<2>(const StepTools<2>&, const State<2>&, State<2>&, State<2>*, const Attempt&,
+                                         StepResult);
+template StepResult take_shorter_step<3>(const StepTools<3>&, const State<3>&, State<3>&, State<3>*, const Attempt&,
+                                         StepResult);
 template StepResult take_step_in_halves<2>(const StepTools<2>&, const State<2>&, State<2>&, const Attempt&, StepResult);
 template StepResult take_step_in_halves<3>(const StepTools<3>&, const State<3>&, State<3>&, const Attempt&, StepResult);
 

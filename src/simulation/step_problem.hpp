@@ -50,6 +50,15 @@ struct ProblemCache {
 template <int Dim>
 class LaggedSolve;
 
+/// Errors in time of a step that is solved.
+struct TimeErrors {
+  double local = 0;           ///< energy of its local error [J]; not finite where no solver could tell
+  double energy = 0;          ///< kinetic, elastic and contact energy at its end [J]
+  double impact = 0;          ///< kinetic energy that nodes lost as they came into contact [J]
+  double resolving_dt = 0;    ///< which resolves how contact stops these nodes [s]
+  double way_to_contact = 1;  ///< the part of the flight to x-hat after which the first surfaces would touch
+};
+
 template <int Dim>
 class StepProblem {
  public:
@@ -88,6 +97,8 @@ class StepProblem {
   double created_energy(const History& history, const VectorX& x);
   /// Kinetic, elastic and contact energy [J].
   double mechanical_energy(const VectorX& x, const VectorX& v);
+  /// The errors of the step to x that the last solve found; `has_system`: in iterations, so that its system is about x's.
+  TimeErrors time_errors(const History& history, const VectorX& x, bool has_system);
   /// Elastic energies that differ by less are the same to round-off, whatever their values [J].
   double energy_resolution() const;
   const BarrierStiffness& stiffness() const { return stiffness_; }
@@ -104,6 +115,8 @@ class StepProblem {
   using Traits = TermTraits<Dim>;
   void initialize_stiffness(const VectorX& x);
   void smooth_friction_by(double motion);
+  double local_error_energy(const History& history, const VectorX& increment);
+  void find_impact(const History& history, const VectorX& x, const VectorX& v, TimeErrors& errors);
   void reset_system();
   SparseSystem& system();
   VectorX momentum(const VectorX& v) const;

@@ -85,7 +85,7 @@ void Watch<Dim>::find_loose_forces(const Setup<Dim>& setup, const State<Dim>& st
   const double energy = std::max(state.stored_energy, report.energy.inertia);
   const double error = std::sqrt(report.residual_worth / energy);
   loose_steps_ = energy > kNoStrain * kNoStrain * stiffness(setup) && error > kForceError ? loose_steps_ + 1 : 0;
-  if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && state.step >= setup.time.steps)) return;
+  if (loose_steps_ < kLooseSteps && !(loose_steps_ > 0 && setup.time.is_over(state.step, state.t))) return;
   has_said_forces_ = true;
   logger.warning(fmt::format(
       "step {}: Newton ended where one more iteration would gain {} of {}: forces may be off by about "
@@ -122,7 +122,7 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
     gap_ = counts ? work / force : 0;
     gap_fraction_ = work / std::max(2 * most_elastic_ - work, kLeastRest * work);
   }
-  if (state.step < setup.time.steps || !(gap_fraction_ > kGapFraction)) return;
+  if (!setup.time.is_over(state.step, state.t) || !(gap_fraction_ > kGapFraction)) return;
   logger.warning(fmt::format(
       "surfaces that press each other stand off by about {}, {:.2g} % of the way that bodies would be compressed by without "
       "gaps: forces may be too large by as much; a smaller /contact/dhat than {} helps",
@@ -139,7 +139,7 @@ void Watch<Dim>::find_unbalanced_reactions(const Setup<Dim>& setup, const StepRe
   largest_reaction_ = std::max(largest_reaction_, largest(forces.reaction));
   const double left = largest(forces.residual);
   unbalanced_steps_ = left > kReactionLeft * largest_reaction_ && largest_reaction_ > 0 ? unbalanced_steps_ + 1 : 0;
-  if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && report.step >= setup.time.steps)) return;
+  if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && setup.time.is_over(report.step, report.t))) return;
   has_said_reactions_ = true;
   logger.warning(fmt::format(
       "step {}: {} are left of the balance of forces at a vertex, {:.2g} % of the largest reaction: reactions may be off by "

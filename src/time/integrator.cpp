@@ -14,8 +14,12 @@ struct BdfRow {
 };
 
 /// Backward differentiation formulas of order 1 to 6.
-const BdfRow& bdf(int order) {
-  static constexpr auto row = [](double d, std::array<double, 6> n, double b) {
+BdfRow bdf(int order, double ratio) {
+  if (order == 2 && ratio != 1) {
+    const double d = 1 + 2 * ratio, grown = (1 + ratio) * (1 + ratio);
+    return {{grown / d, -ratio * ratio / d}, (1 + ratio) / d};
+  }
+  constexpr auto row = [](double d, std::array<double, 6> n, double b) {
     for (double& w : n) w /= d;
     return BdfRow{n, b / d};
   };
@@ -53,6 +57,11 @@ bool TimeIntegrator::is_trapezoidal(const History& history) const {
 
 int TimeIntegrator::depth() const { return options_.integrator == Integrator::bdf ? options_.bdf_order : 1; }
 
+int TimeIntegrator::acceleration_depth() const {
+  if (options_.adaptive.enabled && options_.has_inertia()) return 2;
+  return uses_acceleration() ? 1 : 0;
+}
+
 int TimeIntegrator::order(const History& history) const {
   return std::min<int>(depth(), static_cast<int>(history.x.size()));
 }
@@ -67,7 +76,8 @@ VectorX TimeIntegrator::predicted_increment(const History& history) const {
   const double h = options_.dt;
   if (is_newmark(history)) return h * history.v[0] + h * h * (0.5 - options_.newmark_beta) * history.a[0];
   const int k = order(history);
-  return combine_increments(bdf(k), k, history.x) + bdf(k).b * h * combine(bdf(k), k, history.v);
+  const BdfRow row = bdf(k, ratio(history));
+  return combine_increments(row, k, history.x) + row.b * h * combine(row, k, history.v);
 }
 
 VectorX TimeIntegrator::predictor(const History& history) const { return history.x[0] + predicted_increment(history); }
@@ -76,14 +86,14 @@ double TimeIntegrator::scaling(const History& history) const {
   if (options_.is_static) return 1;
   const double h = options_.dt;
   if (is_newmark(history)) return options_.newmark_beta * h * h;
-  const double b = bdf(order(history)).b;
+  const double b = bdf(order(history), ratio(history)).b;
   return b * b * h * h;
 }
 
 double TimeIntegrator::velocity_rate(const History& history) const {
   if (options_.is_static) return 1;
   if (is_newmark(history)) return options_.newmark_gamma / (options_.newmark_beta * options_.dt);
-  return 1 / (bdf(order(history)).b * options_.dt);
+  return 1 / (bdf(order(history), ratio(history)).b * options_.dt);
 }
 
 /// The positions of no velocity minus the newest ones.
@@ -93,7 +103,7 @@ VectorX TimeIntegrator::reference_increment(const History& history) const {
     return ((1 - gamma / beta) * history.v[0] + (1 - gamma / (2 * beta)) * h * history.a[0]) * (-beta * h / gamma);
   }
   const int k = order(history);
-  return combine_increments(bdf(k), k, history.x);
+  return combine_increments(bdf(k, ratio(history)), k, history.x);
 }
 
 VectorX TimeIntegrator::velocity_reference(const History& history) const {
@@ -113,20 +123,45 @@ VectorX TimeIntegrator::acceleration(const VectorX& v, const History& history) c
   if (is_newmark(history))
     return (v - history.v[0] - (1 - options_.newmark_gamma) * h * history.a[0]) / (options_.newmark_gamma * h);
   const int k = order(history);
-  return (v - combine(bdf(k), k, history.v)) / (bdf(k).b * h);
+  const BdfRow row = bdf(k, ratio(history));
+  return (v - combine(row, k, history.v)) / (row.b * h);
+}
+
+double TimeIntegrator::error_constant(const History& history) const {
+  if (is_newmark(history)) return 1.0 / 12;
+  if (order(history) == 1) return 0.5;
+  const double w = ratio(history);
+  return (1 + w) * (1 + w) / (6 * w * (1 + 2 * w));
+}
+
+LocalError TimeIntegrator::local_error(const VectorX& increment, const History& history) const {
+  const double h = options_.dt, C = error_constant(history);
+  const VectorX v = velocity_after(increment, history), a = acceleration(v, history);
+  const std::vector<VectorX>& past = history.a;
+  LocalError error;
+  if (accuracy(history) < 2 || past.empty()) {
+    error.x = C * h * (v - history.v[0]);
+    if (!past.empty()) error.v = C * h * (a - past[0]);
+    return error;
+  }
+  error.x = C * h * h * (a - past[0]);
+  if (past.size() > 1)
+    error.v = 2 * C * h * h * h / (h + history.dt) * ((a - past[0]) / h - (past[0] - past[1]) / history.dt);
+  return error;
 }
 
 void TimeIntegrator::push(VectorX x, const VectorX& increment, History& history) const {
   VectorX v = velocity_after(increment, history);
-  VectorX a = uses_acceleration() ? acceleration(v, history) : VectorX();
-  const auto push_front = [&](std::vector<VectorX>& past, VectorX newest) {
+  VectorX a = acceleration_depth() > 0 ? acceleration(v, history) : VectorX();
+  const auto push_front = [](std::vector<VectorX>& past, VectorX newest, int depth) {
     past.insert(past.begin(), std::move(newest));
-    past.resize(std::min<std::size_t>(past.size(), depth()));
+    past.resize(std::min<std::size_t>(past.size(), depth));
   };
   history.damp_next = false;
-  push_front(history.x, std::move(x));
-  push_front(history.v, std::move(v));
-  if (uses_acceleration()) push_front(history.a, std::move(a));
+  history.dt = options_.dt;
+  push_front(history.x, std::move(x), depth());
+  push_front(history.v, std::move(v), depth());
+  push_front(history.a, std::move(a), acceleration_depth());
 }
 
 }  // namespace itr

@@ -14,9 +14,16 @@ namespace itr {
 struct History {
   std::vector<VectorX> x;  ///< [m]
   std::vector<VectorX> v;  ///< [m/s]
-  std::vector<VectorX> a;  ///< [m/s^2]
+  std::vector<VectorX> a;  ///< [m/s^2]; of Newmark, and of two states where steps are adaptive
+  double dt = 0;           ///< of the step that led to x[0] [s]; 0: as long as the next one
   /// Newmark only: the next step is one of implicit Euler, which dissipates (see TimeOptions::energy_growth_limit).
   bool damp_next = false;
+};
+
+/// The error in time that one step adds.
+struct LocalError {
+  VectorX x;  ///< [m]
+  VectorX v;  ///< [m/s]; empty where the past has too few accelerations
 };
 
 class TimeIntegrator {
@@ -29,9 +36,13 @@ class TimeIntegrator {
   int accuracy(const History& history) const;
   /// How many past states need to be kept.
   int depth() const;
+  /// How many past accelerations need to be kept.
+  int acceleration_depth() const;
   /// Whether the next step is one of the trapezoidal rule: no dissipation, so a bad step can create energy.
   bool is_trapezoidal(const History& history) const;
   bool uses_acceleration() const { return options_.integrator == Integrator::newmark; }
+  /// h by the length of the step before; 1 where that is not known.
+  double ratio(const History& history) const { return history.dt > 0 ? options_.dt / history.dt : 1; }
 
   /// x-hat: where the body flies without forces [m].
   VectorX predictor(const History& history) const;
@@ -49,6 +60,11 @@ class TimeIntegrator {
   /// Velocity at the newest positions plus `increment`, without the round-off of positions.
   VectorX velocity_after(const VectorX& increment, const History& history) const;
   VectorX acceleration(const VectorX& v, const History& history) const;
+  /// The leading term of the local error of a step of this increment, by differences of accelerations (order 2) or of
+  /// velocities and accelerations (order 1).
+  LocalError local_error(const VectorX& increment, const History& history) const;
+  /// C of the local error C h^(p+1) d^(p+1)x/dt^(p+1), where p is `accuracy`.
+  double error_constant(const History& history) const;
   /// Makes x the newest state; `increment` is x minus the newest positions, before it was rounded.
   void push(VectorX x, const VectorX& increment, History& history) const;
   void push(const VectorX& x, History& history) const { push(x, x - history.x[0], history); }

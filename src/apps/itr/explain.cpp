@@ -42,6 +42,16 @@ std::string describe(const TimeOptions& time, const Units& units) {
   const std::string scheme = time.integrator == Integrator::newmark          ? "Newmark"
                              : time.integrator == Integrator::implicit_euler ? "implicit Euler"
                                                                              : "BDF" + std::to_string(time.bdf_order);
+  if (time.adaptive.enabled) {
+    const AdaptiveTimeOptions& adaptive = time.adaptive;
+    std::string text = fmt::format("{}{}, from {} to {} by steps of {} to {} for a tolerance of {:g}",
+                                   time.quasistatic ? "quasistatic, " : "", scheme, units.text(adaptive.begin, "s", 8),
+                                   units.text(adaptive.end, "s", 8), units.text(adaptive.dt_min, "s", 3),
+                                   units.text(adaptive.dt_max, "s", 3), adaptive.tolerance);
+    if (!adaptive.kinks.empty())
+      text += fmt::format("; {} of them end where values are not smooth in time", adaptive.kinks.size());
+    return text;
+  }
   return fmt::format("{}{}, {} steps of {} from {}", time.quasistatic ? "quasistatic, " : "", scheme, time.steps,
                      units.text(time.dt, "s", 8), units.text(time.t0, "s", 8));
 }
@@ -311,8 +321,8 @@ Json facts(const Setup<Dim>& setup, const Json& scene) {
           {"time",
            {{"static", setup.time.is_static},
             {"quasistatic", setup.time.quasistatic},
-            {"dt", units.from_si(setup.time.dt, "s")},
-            {"steps", setup.time.steps}}},
+            {"dt", setup.time.adaptive.enabled ? Json("auto") : Json(units.from_si(setup.time.dt, "s"))},
+            {"steps", setup.time.adaptive.enabled ? Json() : Json(setup.time.steps)}}},
           {"cells", setup.mesh.num_cells()},
           {"bodies", bodies},
           {"box", filled_box(setup.mesh, units)},

@@ -105,10 +105,12 @@ std::string describe_seconds(double seconds) {
 }
 
 /// `left`: time that the steps to come take if they take as long as those so far [s].
-void show_progress(const StepReport& report, const Units& units, int steps, double left) {
+void show_progress(const StepReport& report, const Units& units, const TimeOptions& time, double left) {
+  const std::string of = time.adaptive.enabled ? "" : fmt::format("/{}", time.steps);
+  const std::string dt = time.adaptive.enabled ? "  dt = " + units.text(report.dt, "s", 3) : "";
   const std::string line =
-      fmt::format("step {}/{}  t = {}  {} vertices  {} Newton iterations  total {}  {:.3g} s  {} left", report.step, steps,
-                  units.text(report.t, "s", 6), report.vertices, report.newton_iterations,
+      fmt::format("step {}{}  t = {}{}  {} vertices  {} Newton iterations  total {}  {:.3g} s  {} left", report.step, of,
+                  units.text(report.t, "s", 6), dt, report.vertices, report.newton_iterations,
                   units.text(report.energy.total, "J", 6), report.seconds.total, describe_seconds(left));
   if (isatty(STDOUT_FILENO)) {
     fmt::print("\r\033[K{}", line);
@@ -162,6 +164,14 @@ std::string describe_remeshing(const StepReport& totals, const Units& units, int
                     units.text(totals.best_refused_split, "J", 2), units.text(totals.split_tolerance, "J", 2), bound);
 }
 
+/// Says what steps were chosen, and what they add to the error.
+std::string describe_steps(const StepReport& totals, const AdaptiveTimeOptions& options) {
+  return fmt::format(
+      "steps for a /time/tolerance of {:g}: {} taken, {} rejected (see steps.jsonl); "
+      "the estimates of their errors sum up to {:.2g} % of the motion in the energy norm",
+      options.tolerance, totals.step, totals.rejected_steps, 100 * totals.time_error);
+}
+
 std::string describe_solves(const StepReport& totals) {
   std::string text = fmt::format("{} Newton iterations, {} linear systems, {} factorizations", totals.newton_iterations,
                                  totals.linear_solves, totals.factorizations);
@@ -189,7 +199,7 @@ void check_changes(const std::vector<scene::Change>& changes, const RunOptions& 
                     fmt::format("the scene of {}{}", saved.file.string(),
                                 could_be_allowed ? ", or --allow-changes: these are of how steps are solved"
                                                  : "; /time/tend may change, and with --allow-changes /time/step_cuts, "
-                                                   "/solver and /space/remesh")});
+                                                   "/time/tolerance, dt_min and dt_max, /solver and /space/remesh")});
 }
 
 /// Throws InputError where new results would be in other units than those of the folder.
@@ -300,6 +310,8 @@ class Run {
     const bool is_finished = outcome == kFinished;
     const Setup<Dim>& setup = simulation_.setup();
     if (is_finished) fmt::print("{} steps in {}: {}\n", simulation_.steps(), directory_, describe_solves(writer_->totals()));
+    if (is_finished && setup.time.adaptive.enabled)
+      fmt::print("{}\n", describe_steps(writer_->totals(), setup.time.adaptive));
     if (is_finished && setup.remesh.enabled)
       fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices()));
     if (const int count = writer_->warnings(); count > 0)
@@ -381,7 +393,7 @@ class Run {
   /// Until the end or until something stops it; says what, and in `advice` what can be done. Only while it is in a step, the
   /// output is not `at_output`.
   std::string advance(std::unique_lock<std::mutex>& at_output, std::string& advice) {
-    const int steps = simulation_.setup().time.steps;
+    const TimeOptions& time = simulation_.setup().time;
     const Units& units = simulation_.setup().units;
     while (!simulation_.finished()) {
       before_ = simulation_.save();
@@ -400,16 +412,19 @@ class Run {
       if (!result.ok) {
         advice = fmt::format(
             "the state before it is saved in {}. To go on, change how steps are solved: `itr run` with --resume "
-            "--allow-changes and --set /time/step_cuts=8 (smaller steps where one fails), more "
-            "/solver/nonlinear/max_iterations, or another tolerance or solver; a smaller /time/dt needs a new run",
-            directory_);
+            "--allow-changes and {}, more /solver/nonlinear/max_iterations, or another tolerance or solver{}",
+            directory_,
+            time.adaptive.enabled ? "a smaller /time/dt_min" : "--set /time/step_cuts=8 (smaller steps where one fails)",
+            time.adaptive.enabled ? "" : "; a smaller /time/dt needs a new run");
         return fmt::format("stopped in step {} (t = {}): {}", simulation_.steps() + 1,
                            units.text(simulation_.time() + simulation_.setup().time.dt, "s", 6), result.reason);
       }
       write(result.report);
       if (profile_) profile_->add(result.report.step);
       ++steps_done_;
-      show_progress(result.report, units, steps, (seconds_now() - start_) / steps_done_ * (steps - result.report.step));
+      const double steps_left =
+          time.adaptive.enabled ? (time.adaptive.end - result.report.t) / result.report.dt : time.steps - result.report.step;
+      show_progress(result.report, units, time, (seconds_now() - start_) / steps_done_ * steps_left);
       if (interrupted && !simulation_.finished()) return fmt::format("interrupted after step {}", simulation_.steps());
     }
     return kFinished;
@@ -433,7 +448,7 @@ class Run {
     output_seconds_ = 0;
     const ScopedTimer timer(output_seconds_);
     frame_step_ = report.step;
-    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps());
+    is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps(), simulation_.time());
     const auto store = [this, report, snapshot = simulation_.save(), is_saved = is_saved_] {
       simulation_.observe(snapshot, [&](const FrameView<Dim>& frame) {
         writer_->write(frame, report, is_saved ? snapshot.state.get() : nullptr);

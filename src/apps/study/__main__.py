@@ -69,6 +69,8 @@ class Study:
     def __init__(self, itr, options):
         self.itr, self.options, self.is_interrupted, self.process = itr, options, False, None
         facts = ask(itr, "explain", options.scene, "--json", *words_of_sets(options.set))
+        if facts["time"]["dt"] == "auto":
+            fail(f"{options.scene}: /time/dt: found \"auto\", expected a number: runs are compared step by step")
         settings = [f"`{text}`" for text in options.set] + ([f"solver `{options.solver}`"] if options.solver else [])
         options.sets = dict(text.split("=", 1) for text in options.set)
         self.plan, self.has_contact = Plan(options, facts), facts["contact"]
