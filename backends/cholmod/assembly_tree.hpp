@@ -36,6 +36,7 @@ struct AssemblyTree {
   int columns(int front) const { return first_columns[front + 1] - first_columns[front]; }
   int height(int front) const { return row_starts[front + 1] - row_starts[front]; }
   int below(int front) const { return height(front) - columns(front); }
+  std::size_t panel_size(int front) const { return panels[front + 1] - panels[front]; }
   std::span<const int> rows_below(int front) const { return span_below(rows, front); }
   std::span<const int> relative_below(int front) const { return span_below(relative, front); }
   std::span<const int> children_of(int front) const {

@@ -136,7 +136,12 @@ class Cholmod {
     result.factor_nonzeros = common_.lnz;
     result.factor_bytes = result.largest_bytes =
         factor_->is_super ? 8.0 * factor_->xsize + 4.0 * factor_->ssize : 12.0 * factor_->nzmax;
-    if (is_by_tasks_) result.largest_bytes += sizeof(double) * static_cast<double>(tasks_.work_size());
+    if (is_by_tasks_) {
+      result.largest_bytes += sizeof(double) * static_cast<double>(tasks_.work_size());
+      result.tasks_wall = tasks_.times().wall;
+      result.tasks_work = tasks_.times().work;
+      result.tasks_span = tasks_.times().span;
+    }
     result.flops = common_.fl;
     return result;
   }
@@ -236,7 +241,7 @@ const char* version() {
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   using Choice = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_AUTO>>;
-  using Tasks = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_AUTO, Numeric::tasks>>;
+  using Tasks = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL, Numeric::tasks>>;
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
   constexpr uint32_t kCapabilities = ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS;

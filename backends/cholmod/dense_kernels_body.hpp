@@ -10,10 +10,20 @@
 #include <cstring>
 #include <type_traits>
 
-#include "blas.hpp"
 #include "dense_kernels.hpp"
 
 namespace itr::backends {
+
+/// dgemm of this module's libraries, and the pieces that a product is cut into for it.
+struct Blas {
+  using Gemm = void(const char*, const char*, const int*, const int*, const int*, const double*, const double*, const int*,
+                    const double*, const int*, const double*, double*, const int*);
+  Gemm* gemm;
+  int rows, columns, depth;
+};
+
+const Blas& blas();
+
 namespace {
 
 /// Rows that a register takes.

@@ -41,13 +41,15 @@ bool TaskCholesky::analyze(const SupernodalPattern& pattern) {
   double total = 0;
   for (int s = 0; s < tree_.size; ++s) total += tree_.cost(s);
   cut_ = TreeCut(tree_, std::max(kLeastPiece, total / kPieces));
-  if (factor_.size() < factor_size() || factor_.size() > 2 * factor_size()) factor_ = {};
+  if (factor_.size() < factor_size() || factor_.size() > 2 * factor_size()) {
+    factor_ = {};
+    pool_.clear();
+    stacks_.clear();
+  }
   contributions_.assign(tree_.size, {});
   for (int s = 0; s < tree_.size; ++s) contributions_[s].order = tree_.below(s);
   blocks_.clear();
   blocks_.resize(tree_.size);
-  pool_.clear();
-  stacks_.clear();
   plan_stacks();
   plan_factorization();
   plan_solves();
@@ -141,11 +143,6 @@ TaskCholesky::Range TaskCholesky::tile_rows(int s, int tile) const {
 
 bool TaskCholesky::is_tiled(int s) const { return tree_.cost(s) > kTiledFrom; }
 
-TaskCholesky::Times TaskCholesky::times(const Graph& graph, const std::vector<double>& seconds) const {
-  if (seconds.empty()) return {};
-  return {std::accumulate(seconds.begin(), seconds.end(), 0.0), graph.graph.span(seconds), graph.graph.size()};
-}
-
 // --- Factorisation ---
 
 int TaskCholesky::factorize(const double* values, std::span<const int> sources) {
@@ -157,12 +154,13 @@ int TaskCholesky::factorize(const double* values, std::span<const int> sources) 
     for (int s = 0; s < tree_.size; ++s) release(s);
   };
   try {
-    factor_graph_.graph.run([&](int task) { run(factor_graph_.tasks[task]); }, measures_ ? &factor_seconds_ : nullptr);
+    factor_graph_.graph.run([&](int task) { run(factor_graph_.tasks[task]); });
   } catch (...) {
     release_all();
     throw;
   }
   release_all();
+  times_ = factor_graph_.graph.times();
   return failed_;
 }
 
@@ -189,10 +187,10 @@ void TaskCholesky::run(const Task& task) {
 }
 
 void TaskCholesky::factorize_piece(const Piece& piece) {
-  Stacks stacks = stacks_.take([](const Stacks&) { return true; },
-                               [&] {
-                                 return Stacks{{Doubles(stack_sizes_[0]), Doubles(stack_sizes_[1])}};
-                               });
+  const auto fits = [&](const Stacks& free) {
+    return free.values[0].size() >= stack_sizes_[0] && free.values[1].size() >= stack_sizes_[1] ? 0 : -1;
+  };
+  Stacks stacks = stacks_.take(fits, [&] { return Stacks{{Doubles(stack_sizes_[0]), Doubles(stack_sizes_[1])}}; });
   std::size_t top[2] = {0, 0};
   for (int s = piece.begin; s < piece.end && !has_failed(s); ++s) {
     const int parity = parity_[s];
@@ -294,8 +292,10 @@ void TaskCholesky::fail(int column) {
 void TaskCholesky::open(int s) {
   const std::size_t size = Contribution::size(tree_.below(s));
   if (size == 0) return;
-  blocks_[s] = pool_.take([&](const Doubles& free) { return free.size() >= size && free.size() / 2 <= size; },
-                          [&] { return Doubles(size); });
+  const auto excess = [&](const Doubles& free) {
+    return free.size() / 2 > size ? -1 : static_cast<std::ptrdiff_t>(free.size()) - static_cast<std::ptrdiff_t>(size);
+  };
+  blocks_[s] = pool_.take(excess, [&] { return Doubles(size); });
   contributions_[s].values = blocks_[s].data();
 }
 

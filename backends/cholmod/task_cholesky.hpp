@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "assembly_tree.hpp"
@@ -36,18 +37,20 @@ class Doubles {
 template <typename Object>
 class Pool {
  public:
-  /// A free one that `fits`, else one that `make` makes.
-  template <typename Fits, typename Make>
-  Object take(const Fits& fits, const Make& make) {
+  /// The free one of least `excess` that is not negative, else one that `make` makes.
+  template <typename Excess, typename Make>
+  Object take(const Excess& excess, const Make& make) {
     {
       const std::scoped_lock guard(lock_);
-      for (auto& object : free_)
-        if (fits(object)) {
-          Object taken = std::move(object);
-          object = std::move(free_.back());
-          free_.pop_back();
-          return taken;
-        }
+      auto best = free_.end();
+      for (auto it = free_.begin(); it != free_.end(); ++it)
+        if (excess(*it) >= 0 && (best == free_.end() || excess(*it) < excess(*best))) best = it;
+      if (best != free_.end()) {
+        std::swap(*best, free_.back());
+        Object taken = std::move(free_.back());
+        free_.pop_back();
+        return taken;
+      }
     }
     return make();
   }
@@ -79,13 +82,8 @@ class TaskCholesky {
   /// Doubles beside the factor that the last factorisation has used.
   std::size_t work_size() const;
 
-  /// Seconds of tasks, to study how they scale.
-  struct Times {
-    double work = 0, span = 0;  ///< of all tasks; of the longest chain of them
-    int tasks = 0;
-  };
-  void measure(bool asked) { measures_ = asked; }
-  Times factorization_times() const { return times(factor_graph_, factor_seconds_); }
+  /// Of the last factorisation or solve.
+  const TaskTimes& times() const { return times_; }
 
  private:
   enum class Kind : char { piece, front, open, panel, tile, block, close, gather, rows, columns, pivots };
@@ -124,7 +122,8 @@ class TaskCholesky {
   void plan_factorization();
   void plan_tiles(int front, std::vector<int>& done);
   void plan_solves();
-  Times times(const Graph& graph, const std::vector<double>& seconds) const;
+  void plan_forward();
+  void plan_backward();
 
   double* panel(int front) const { return factor_.data() + tree_.panels[front]; }
   int num_panels(int front) const;
@@ -165,8 +164,7 @@ class TaskCholesky {
   std::atomic<int> failed_{0};  ///< least column so far with a pivot that is not positive
   const double* values_ = nullptr;
   std::span<const int> sources_;
-  bool measures_ = false;
-  std::vector<double> factor_seconds_;
+  TaskTimes times_;
 };
 
 }  // namespace itr::backends

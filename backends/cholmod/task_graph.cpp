@@ -6,7 +6,8 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <ctime>
+#include <chrono>
+#include <numeric>
 
 namespace itr::backends {
 
@@ -18,12 +19,7 @@ std::size_t num_threads() {
                                tbb::this_task_arena::max_concurrency());
 }
 
-/// Of this thread: other work on its core does not count.
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
+double seconds_now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 }  // namespace
 
@@ -87,34 +83,32 @@ void TaskGraph::finish() {
   edges_ = {};
 }
 
-void TaskGraph::run(const std::function<void(int)>& work, std::vector<double>* seconds) {
-  if (seconds) {
-    seconds->assign(size(), 0);
-    const std::function<void(int)> timed = [&](int task) {
-      const double start = processor_seconds();
-      work(task);
-      (*seconds)[task] = processor_seconds() - start;
-    };
-    return run(timed);
-  }
+void TaskGraph::run(const std::function<void(int)>& work) {
+  seconds_.resize(size());
+  const std::function<void(int)> timed = [&](int task) {
+    const double start = seconds_now();
+    work(task);
+    seconds_[task] = seconds_now() - start;
+  };
+  const double start = seconds_now();
   if (size() < 2 || num_threads() < 2) {
-    for (int t = 0; t < size(); ++t) work(t);
-    return;
+    for (int t = 0; t < size(); ++t) timed(t);
+  } else {
+    Run now(*this, timed);
+    for (const int task : first_) now.start(task);
+    now.group.wait();
+    now.left.load(std::memory_order_acquire);
   }
-  Run now(*this, work);
-  for (const int task : first_) now.start(task);
-  now.group.wait();
-  now.left.load(std::memory_order_acquire);
+  times_ = {seconds_now() - start, std::accumulate(seconds_.begin(), seconds_.end(), 0.0), span(seconds_)};
 }
 
-double TaskGraph::span(const std::vector<double>& costs) const {
-  std::vector<double> chain = costs;
+double TaskGraph::span(std::vector<double> costs) const {
   double longest = 0;
   for (int t = size() - 1; t >= 0; --t) {
     double after = 0;
-    for (int k = starts_[t]; k < starts_[t + 1]; ++k) after = std::max(after, chain[later_[k]]);
-    chain[t] += after;
-    longest = std::max(longest, chain[t]);
+    for (int k = starts_[t]; k < starts_[t + 1]; ++k) after = std::max(after, costs[later_[k]]);
+    costs[t] += after;
+    longest = std::max(longest, costs[t]);
   }
   return longest;
 }

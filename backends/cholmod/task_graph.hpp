@@ -9,6 +9,13 @@
 
 namespace itr::backends {
 
+/// Seconds of a run.
+struct TaskTimes {
+  double wall = 0;
+  double work = 0;  ///< sum over all tasks
+  double span = 0;  ///< sum over the longest chain of tasks that wait for each other
+};
+
 /// Tasks with the tasks that each one waits for. It is made once, and run as often as one likes.
 class TaskGraph {
  public:
@@ -23,14 +30,17 @@ class TaskGraph {
 
   /// Calls `work` with each task's number, in their order on one thread, else as soon as what they wait for is done. Work
   /// that writes where no other task does that may run at the same time has the same results on any number of threads.
-  /// Processor seconds of each task go to `seconds`, if it is there.
-  void run(const std::function<void(int)>& work, std::vector<double>* seconds = nullptr);
-  /// Longest chain of tasks that wait for each other, in the unit of these costs.
-  double span(const std::vector<double>& costs) const;
+  void run(const std::function<void(int)>& work);
+  /// Of the last run, by the clock.
+  const TaskTimes& times() const { return times_; }
 
  private:
   struct Run;
-  std::vector<double> costs_;
+  /// Longest chain, in the unit of these costs.
+  double span(std::vector<double> costs) const;
+
+  std::vector<double> costs_, seconds_;
+  TaskTimes times_;
   std::vector<std::pair<int, int>> edges_;     ///< (earlier, later), until finish()
   std::vector<int> starts_, later_, waiting_;  ///< those that wait for a task, by starts_; how many it waits for
   std::vector<int> first_;                     ///< those that wait for none

@@ -14,6 +14,19 @@ constexpr int kColumns = 64;                   ///< of a task of a backward solv
 constexpr std::size_t kTiledFrom = 1 << 16;    ///< entries of a panel
 constexpr std::size_t kByTasksFrom = 1 << 18;  ///< entries of a factor
 
+struct Part {
+  int begin, end;
+};
+
+/// Part of `size` rows or columns of a front that one task takes: `width` of them, or all where the front is small.
+Part part_of(const AssemblyTree& tree, int front, int size, int width, int part) {
+  if (tree.panel_size(front) < kTiledFrom) return {0, size};
+  return {part * width, std::min(size, (part + 1) * width)};
+}
+int num_parts(const AssemblyTree& tree, int front, int size, int width) {
+  return tree.panel_size(front) < kTiledFrom ? 1 : std::max(1, (size + width - 1) / width);
+}
+
 }  // namespace
 
 /// One solve with all its columns. Solution and updates are stored column after column.
@@ -49,31 +62,32 @@ void TaskCholesky::plan_solves() {
   for (int s = 0; s < tree_.size; ++s)
     updates_[s + 1] = updates_[s] + (cut_.is_above[s] || cut_.is_root(tree_, s) ? tree_.below(s) : 0);
   solves_by_tasks_ = factor_size() > kByTasksFrom;
-  const auto panel_size = [&](int s) { return double(tree_.height(s)) * tree_.columns(s); };
-  const auto parts = [&](int s, int size, int part) {
-    return panel_size(s) < kTiledFrom ? 1 : std::max(1, (size + part - 1) / part);
-  };
-  std::vector<double> piece_costs;
-  for (const Piece& piece : cut_.pieces) piece_costs.push_back(double(tree_.panels[piece.end] - tree_.panels[piece.begin]));
+  plan_forward();
+  plan_backward();
+}
 
+void TaskCholesky::plan_forward() {
   forward_graph_.clear();
   std::vector<std::vector<int>> done(tree_.size);  // tasks after which a root's or a front's update is there
   for (std::size_t p = 0; p < cut_.pieces.size(); ++p) {
-    const int task = forward_graph_.add({Kind::piece, static_cast<int>(p)}, piece_costs[p]);
-    for (int s = cut_.pieces[p].begin; s < cut_.pieces[p].end; ++s) done[s] = {task};
+    const auto [begin, end] = cut_.pieces[p];
+    const int task = forward_graph_.add({Kind::piece, static_cast<int>(p)}, double(tree_.panels[end] - tree_.panels[begin]));
+    for (int s = begin; s < end; ++s) done[s] = {task};
   }
   for (int s = 0; s < tree_.size; ++s) {
     if (!cut_.is_above[s]) continue;
-    const int pivots = forward_graph_.add({Kind::pivots, s}, panel_size(s) / 2);
+    const int pivots = forward_graph_.add({Kind::pivots, s}, double(tree_.panel_size(s)) / 2);
     for (const int child : tree_.children_of(s))
       for (const int task : done[child]) forward_graph_.graph.wait_for(pivots, task);
-    for (int part = 0; part < parts(s, tree_.below(s), kRows); ++part) {
+    for (int part = 0; part < num_parts(tree_, s, tree_.below(s), kRows); ++part) {
       done[s].push_back(forward_graph_.add({Kind::rows, s, part}, double(kRows) * tree_.columns(s)));
       forward_graph_.graph.wait_for(done[s].back(), pivots);
     }
   }
   forward_graph_.graph.finish();
+}
 
+void TaskCholesky::plan_backward() {
   backward_graph_.clear();
   std::vector<int> solved(tree_.size, -1);
   const auto wait_for_parent = [&](int task, int s) {
@@ -84,16 +98,18 @@ void TaskCholesky::plan_solves() {
     const int gather = backward_graph_.add({Kind::gather, s}, tree_.below(s));
     wait_for_parent(gather, s);
     std::vector<int> before;
-    for (int part = 0; part < parts(s, tree_.columns(s), kColumns); ++part) {
+    for (int part = 0; part < num_parts(tree_, s, tree_.columns(s), kColumns); ++part) {
       before.push_back(backward_graph_.add({Kind::columns, s, part}, double(kColumns) * tree_.below(s)));
       backward_graph_.graph.wait_for(before.back(), gather);
     }
-    solved[s] = backward_graph_.add({Kind::pivots, s}, panel_size(s) / 2);
+    solved[s] = backward_graph_.add({Kind::pivots, s}, double(tree_.panel_size(s)) / 2);
     for (const int task : before) backward_graph_.graph.wait_for(solved[s], task);
   }
   for (std::size_t p = cut_.pieces.size(); p-- > 0;) {
-    const int task = backward_graph_.add({Kind::piece, static_cast<int>(p)}, piece_costs[p]);
-    for (int s = cut_.pieces[p].begin; s < cut_.pieces[p].end; ++s)
+    const auto [begin, end] = cut_.pieces[p];
+    const int task =
+        backward_graph_.add({Kind::piece, static_cast<int>(p)}, double(tree_.panels[end] - tree_.panels[begin]));
+    for (int s = begin; s < end; ++s)
       if (cut_.is_root(tree_, s)) wait_for_parent(task, s);
   }
   backward_graph_.graph.finish();
@@ -106,13 +122,17 @@ void TaskCholesky::solve(const double* rhs, double* solution, int columns, const
   for (int c = 0; c < columns; ++c)
     for (std::size_t i = 0; i < n; ++i) permuted_[c * n + i] = rhs[c * n + permutation[i]];
   Solve now(*this, columns);
+  times_ = {};
   for (const bool forward : {true, false}) {
     Graph& graph = forward ? forward_graph_ : backward_graph_;
     const auto work = [&](int task) { now.run(graph.tasks[task], forward); };
-    if (solves_by_tasks_)
-      graph.graph.run(work);
-    else
+    if (!solves_by_tasks_) {
       for (int task = 0; task < graph.graph.size(); ++task) work(task);
+      continue;
+    }
+    graph.graph.run(work);
+    const TaskTimes& times = graph.graph.times();
+    times_ = {times_.wall + times.wall, times_.work + times.work, times_.span + times.span};
   }
   for (int c = 0; c < columns; ++c)
     for (std::size_t i = 0; i < n; ++i) solution[c * n + permutation[i]] = permuted_[c * n + i];
@@ -135,7 +155,7 @@ void TaskCholesky::Solve::run(const Task& task, bool forward) {
 }
 
 std::unique_ptr<TaskCholesky::Scratch> TaskCholesky::Solve::take_scratch() {
-  auto scratch = all_.scratch_.take([](const auto&) { return true; }, [] { return std::make_unique<Scratch>(); });
+  auto scratch = all_.scratch_.take([](const auto&) { return 0; }, [] { return std::make_unique<Scratch>(); });
   if (const std::size_t size = static_cast<std::size_t>(tree_.order) * columns_; scratch->above.size() < size)
     scratch->above.resize(size, 0.0);
   if (scratch->front.size() < static_cast<std::size_t>(tree_.order)) scratch->front.resize(tree_.order);
@@ -214,9 +234,8 @@ void TaskCholesky::Solve::pivots(int s, bool forward) {
 }
 
 void TaskCholesky::Solve::rows(int s, int part) {
-  const int k = tree_.columns(s), r = tree_.height(s), m = r - k;
-  const bool is_whole = static_cast<std::size_t>(r) * k < kTiledFrom;
-  const int begin = is_whole ? 0 : part * kRows, end = is_whole ? m : std::min(m, begin + kRows);
+  const int k = tree_.columns(s), r = tree_.height(s);
+  const auto [begin, end] = part_of(tree_, s, r - k, kRows, part);
   for (int c = 0; c < columns_; ++c)
     all_.dense_.subtract_multiple(all_.panel(s) + k + begin, r, solution(c, tree_.first_columns[s]), update(c, s) + begin,
                                   end - begin, k);
@@ -224,8 +243,7 @@ void TaskCholesky::Solve::rows(int s, int part) {
 
 void TaskCholesky::Solve::columns(int s, int part) {
   const int k = tree_.columns(s), r = tree_.height(s);
-  const bool is_whole = static_cast<std::size_t>(r) * k < kTiledFrom;
-  const int begin = is_whole ? 0 : part * kColumns, end = is_whole ? k : std::min(k, begin + kColumns);
+  const auto [begin, end] = part_of(tree_, s, k, kColumns, part);
   for (int c = 0; c < columns_; ++c)
     all_.dense_.subtract_transposed(all_.panel(s) + k + static_cast<std::size_t>(begin) * r, r, update(c, s),
                                     solution(c, tree_.first_columns[s] + begin), r - k, end - begin);

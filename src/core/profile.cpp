@@ -84,13 +84,8 @@ LoopTimer::LoopTimer() : profile_(active_profile) {
 
 LoopTimer::~LoopTimer() {
   if (!profile_) return;
-  const double work = 1e-9 * static_cast<double>(work_), longest = 1e-9 * static_cast<double>(longest_);
-  Profile::Entry& entry = profile_->present();
-  entry.in_loops += seconds_now() - begin_;
-  entry.work += work;
-  entry.span += longest;
-  for (std::size_t i = 0; i < kPredictedCores.size(); ++i)
-    entry.predicted[i] += std::max(longest, work / kPredictedCores[i]);
+  const Profile::Active again(profile_);
+  add_loop(seconds_now() - begin_, 1e-9 * static_cast<double>(work_), 1e-9 * static_cast<double>(longest_));
 }
 
 void LoopTimer::add(double seconds) {
@@ -99,6 +94,15 @@ void LoopTimer::add(double seconds) {
   std::int64_t longest = longest_;
   while (longest < nanoseconds && !longest_.compare_exchange_weak(longest, nanoseconds)) {
   }
+}
+
+void add_loop(double wall, double work, double span) {
+  if (!active_profile) return;
+  Profile::Entry& entry = active_profile->present();
+  entry.in_loops += wall;
+  entry.work += work;
+  entry.span += span;
+  for (std::size_t i = 0; i < kPredictedCores.size(); ++i) entry.predicted[i] += std::max(span, work / kPredictedCores[i]);
 }
 
 void add_bytes(double bytes) {

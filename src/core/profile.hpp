@@ -49,6 +49,7 @@ class Profile {
  private:
   friend class ScopedPhase;
   friend class LoopTimer;
+  friend void add_loop(double wall, double work, double span);
   friend void add_bytes(double bytes);
   struct Entry {
     std::string_view kind, term;
@@ -121,6 +122,10 @@ class LoopTimer {
   double begin_ = 0;
   std::atomic<std::int64_t> work_ = 0, longest_ = 0;  ///< [ns]
 };
+
+/// Counts a part of the present phase that several threads share: its seconds by the clock, of all its pieces, and of the
+/// longest chain of pieces.
+void add_loop(double wall, double work, double span);
 
 /// Counts bytes that the present phase reads or writes.
 void add_bytes(double bytes);
