@@ -17,7 +17,7 @@
 #include "geometry/measures.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
-#include "mesh/connected_parts.hpp"
+#include "core/connected_parts.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/named.hpp"
 #include "simulation/resolution.hpp"

@@ -13,7 +13,7 @@
 #include "fem/quadrature.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
-#include "mesh/connected_parts.hpp"
+#include "core/connected_parts.hpp"
 #include "mesh/rest_box.hpp"
 #include "simulation/advice.hpp"
 #include "simulation/barrier_stiffness.hpp"
