@@ -18,6 +18,7 @@
 #include <thread>
 #include <utility>
 
+#include "advice.hpp"
 #include "core/parallel.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
@@ -27,7 +28,6 @@
 #include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
-#include "simulation/advice.hpp"
 
 namespace itr::cli {
 
