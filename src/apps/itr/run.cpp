@@ -19,6 +19,7 @@
 #include <thread>
 #include <utility>
 
+#include "advice.hpp"
 #include "core/parallel.hpp"
 #include "core/process.hpp"
 #include "core/profile.hpp"
@@ -29,7 +30,6 @@
 #include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
-#include "simulation/advice.hpp"
 
 namespace itr::cli {
 
