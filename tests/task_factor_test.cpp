@@ -104,7 +104,7 @@ class TaskFactor : public ::testing::Test {
     const BackendInfo info = registry_.find("cholmod:tasks");
     if (!info.available) GTEST_SKIP() << "a machine without " << info.name << " does without: " << info.reason;
   }
-  /// Of two right-hand sides; the message where the matrix is refused.
+  /// Solutions for two right-hand sides; the message where the matrix is refused.
   Answer answer(const std::string& name, const System& system, const SolverOptions& options = {}) {
     const auto solver = registry_.create(name, options);
     const std::size_t n = system.pattern.order;

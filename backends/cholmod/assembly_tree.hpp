@@ -70,7 +70,7 @@ struct Contribution {
   int stride(int block) const { return order - first(block); }
   /// The entry (first(block), first(block)).
   double* block(int block) const { return values + begin(order, block); }
-  /// Of the rows of this column, counted from 0: only those of its block and below are there.
+  /// Start of a column by rows from 0, of which only those of its block and below are there.
   double* column(int j) const {
     const int b = j / kBlock;
     return block(b) + static_cast<std::size_t>(j - first(b)) * stride(b) - first(b);

@@ -32,7 +32,7 @@ struct DenseKernels {
   void (*add_scattered)(double* to, const double* from, const int* places, int begin, int end);
 };
 
-/// Those for this processor.
+/// Kernels for this processor.
 const DenseKernels& dense_kernels();
 
 }  // namespace itr::backends

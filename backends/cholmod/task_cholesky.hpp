@@ -82,7 +82,7 @@ class TaskCholesky {
   /// Doubles beside the factor that the last factorisation has used.
   std::size_t work_size() const;
 
-  /// Of the last factorisation or solve.
+  /// Seconds of the last factorisation or solve.
   const TaskTimes& times() const { return times_; }
 
  private:

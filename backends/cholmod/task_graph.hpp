@@ -31,7 +31,7 @@ class TaskGraph {
   /// Calls `work` with each task's number, in their order on one thread, else as soon as what they wait for is done. Work
   /// that writes where no other task does that may run at the same time has the same results on any number of threads.
   void run(const std::function<void(int)>& work);
-  /// Of the last run, by the clock.
+  /// Seconds of the last run, by the clock.
   const TaskTimes& times() const { return times_; }
 
  private:
