@@ -143,13 +143,15 @@ void check_command(const CLI::App& app, int argc, char** argv) {
                     fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
 }
 
-/// Becomes the Python program of `itr study` (src/apps/study), which gets these arguments, the last of them null.
-[[noreturn]] void become_study(char** arguments) {
+/// Becomes the Python program of `itr study` or `itr fit` (src/apps), which gets the other arguments, the last of them null.
+[[noreturn]] void become_python(char** arguments) {
+  const std::string name = *arguments++;
   namespace fs = std::filesystem;
   const fs::path program = fs::canonical("/proc/self/exe");
-  std::string folder = (program.parent_path() / ITR_STUDY_FOLDER).lexically_normal().string();
+  std::string folder = (program.parent_path() / ITR_PYTHON_FOLDER / name).lexically_normal().string();
   if (!fs::exists(folder))
-    throw InputError({folder, "", "no such folder", "the Python program of `itr study`, installed beside the command"});
+    throw InputError(
+        {folder, "", "no such folder", fmt::format("the Python program of `itr {}`, installed beside the command", name)});
   // Runs of a study find the program and its modules even if files are replaced while the study runs.
   const int file = open("/proc/self/exe", O_RDONLY);
   std::string self = file < 0 ? program.string() : fmt::format("/proc/{}/fd/{}", getpid(), file), modules;
@@ -162,7 +164,7 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   for (; *arguments; ++arguments) words.push_back(*arguments);
   words.push_back(nullptr);
   execvp(python.c_str(), words.data());
-  throw InputError({"", "study", "no program " + python, "Python: apt install python3 python3-matplotlib"});
+  throw InputError({"", name, "no program " + python, "Python: apt install python3 python3-matplotlib python3-scipy"});
 }
 
 void check_single_rank() {
@@ -214,10 +216,13 @@ int dispatch(int argc, char** argv) {
   apart->add_option("reference", reference, "result folder of the run to compare with")->required();
   apart->add_flag("--last", last_only, "at the last time that both have stored alone (default: at all of them)");
   app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
+  app.add_subcommand("fit", "coefficients of a law of rubber from several tests at once");
+  const std::string_view asked = argc > 1 ? argv[1] : "";
+  if (asked == "respond") return cli::respond();  // what `itr fit` asks
   check_command(app, argc, argv);
-  if (argc > 1 && std::string_view(argv[1]) == "study") {
+  if (asked == "study" || asked == "fit") {
     check_single_rank();
-    become_study(argv + 2);
+    become_python(argv + 1);
   }
   try {
     app.parse(argc, argv);
