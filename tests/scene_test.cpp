@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "energy/elastic/law_table.hpp"
 #include "scene_folder.hpp"
 #include "simulation/step_problem.hpp"
 
@@ -150,6 +151,61 @@ TEST_F(SceneTest, MaterialsOfAllLaws) {
   EXPECT_DOUBLE_EQ(mooney.youngs_modulus, 9 * 100 * 6 / (300 + 6.));
 }
 
+TEST_F(SceneTest, LawsOfTheTableAreReadByTheirRows) {
+  const auto material = [&](const char* text, const char* defaults = "itr") {
+    return read2(square({{"materials", json::parse(text)}, {"defaults", defaults}})).materials.at(1);
+  };
+  const auto ogden = material(R"({"type": "Ogden", "mus": [0.63, 0.0012, -0.01], "alphas": [1.3, 5, -2], "K": 1000})");
+  EXPECT_EQ(ogden.law, MaterialLaw::own);
+  EXPECT_EQ(itr::sum_of(ogden)->name(), "Ogden");
+  EXPECT_TRUE(ogden.plane_strain);
+  EXPECT_NEAR(ogden.lame_mu(), (0.63 * 1.3 + 0.0012 * 5 + 0.01 * 2) / 2, 1e-14);
+  EXPECT_NEAR(ogden.lame_lambda(2) + 2 * ogden.lame_mu() / 3, 1000, 1e-8);
+  EXPECT_FALSE(material(R"({"type": "Yeoh", "C": [1], "K": 9, "plane_stress": true})").plane_strain);
+  const auto in_plane = material(R"({"type": "Yeoh", "C": 1, "K": 9})", "polyfem");
+  EXPECT_EQ(itr::sum_of(in_plane)->dimension, 2);
+  EXPECT_NEAR(in_plane.lame_lambda(2), 7, 1e-14);  // K is lambda + mu there
+  const auto sum = material(R"({"type": "MaterialSum", "rho": 7, "models": [
+    {"type": "HGOFiber", "k1": 3, "k2": 2, "fiber_direction": ["x", 2]}, {"type": "NeoHookean", "E": 3, "nu": 0.25}]})");
+  EXPECT_EQ(itr::sum_of(sum)->name(), "NeoHookean + HGOFiber");
+  EXPECT_EQ(sum.density, 7);
+  EXPECT_TRUE(sum.has_varying_moduli());
+  EXPECT_LT((itr::sum_of(sum)->terms[1].direction({1.5, 0, 0}) - Vec<3>(0.6, 0.8, 0)).norm(), 1e-15);
+  EXPECT_NEAR(sum.youngs_modulus, 3, 1e-14);
+  const auto scaled = material(R"({"type": "ArrudaBoyce", "mu": 2, "lambda_m": 3, "K": 50})");
+  EXPECT_NEAR(scaled.lame_mu(), 2 * (1 + 3 / 45. + 99 / (175. * 81) + 513 / (875. * 729) + 42039 / (67375. * 6561)), 1e-12);
+}
+
+TEST_F(SceneTest, WrongCoefficientsOfLawsAreNamed) {
+  const auto place = [&](const char* text) { return wrong_place({{"materials", json::parse(text)}}); };
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1]})"), "/materials/K");
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1], "K": -1})"), "/materials/K");
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [], "K": 1})"), "/materials/C");
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [-1], "K": 1})"), "/materials");  // no shear modulus
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1], "K": 1, "mus": [1]})"), "/materials/mus");
+  EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1], "K": 1, "plane_strain": true})"), "/materials/plane_strain");
+  EXPECT_EQ(place(R"({"type": "Ogden", "mus": [1, 2], "alphas": [1], "K": 1})"), "/materials/alphas");
+  EXPECT_EQ(place(R"({"type": "Ogden", "mus": [1], "alphas": [0], "K": 1})"), "/materials/alphas/0");
+  EXPECT_EQ(place(R"({"type": "Hyperfoam", "mus": [1], "alphas": [2], "nus": [0.5]})"), "/materials/nus/0");
+  EXPECT_EQ(place(R"({"type": "Hencky", "E": 1, "nu": 0.5})"), "/materials/nu");
+  EXPECT_EQ(place(R"({"type": "VolumePenalty", "k": 1})"), "/materials");
+  EXPECT_EQ(place(R"({"type": "MaterialSum"})"), "/materials/models");
+  EXPECT_EQ(place(R"({"type": "MaterialSum", "models": [{"type": "SaintVenant", "E": 1, "nu": 0}]})"),
+            "/materials/models/0/type");
+  const auto fibre = [&](const std::string& keys) {
+    return place((R"({"type": "MaterialSum", "models": [{"type": "Hencky", "E": 1, "nu": 0}, {"type": "HGOFiber", "k1": 1)" +
+                  keys + "}]}")
+                     .c_str());
+  };
+  EXPECT_EQ(fibre(R"(, "fiber_direction": [1, 0])"), "/materials/models/1/k2");
+  EXPECT_EQ(fibre(R"(, "k2": 1)"), "/materials/models/1/fiber_direction");
+  EXPECT_EQ(fibre(R"(, "k2": 1, "fiber_direction": [0, 0])"), "/materials/models/1/fiber_direction");
+  EXPECT_EQ(fibre(R"(, "k2": 1, "fiber_direction": ["x - x", 0])"), "/materials/models/1/fiber_direction");
+  EXPECT_EQ(fibre(R"(, "k2": 1, "kappa": 1.5, "fiber_direction": [1, 0])"), "/materials/models/1/kappa");
+  EXPECT_EQ(place(R"({"type": "MaterialSum", "models": [{"type": "VolumePenalty", "k": 9}, {"type": "AMIPS"}]})"),
+            "/materials/models/1/use_rest_pose");
+}
+
 TEST_F(SceneTest, NumbersThatNoDoubleHoldAreNamedByTheirPointer) {
   const auto failure_of = [&](const std::string& text) {
     write("scene.json", text);
@@ -210,7 +266,7 @@ TEST_F(SceneTest, WrongValuesAreRefusedWithTheirPointer) {
   EXPECT_EQ(wrong_place(material("nu", 0.5)), "/materials/0/nu");
   EXPECT_EQ(wrong_place(material("nu", -1)), "/materials/0/nu");
   EXPECT_EQ(wrong_place(material("rho", -3)), "/materials/0/rho");
-  EXPECT_EQ(wrong_place(material("type", "Ogden")), "/materials/0/type");
+  EXPECT_EQ(wrong_place(material("type", "Gent")), "/materials/0/type");
   EXPECT_EQ(wrong_place(material("id", 2)), "/materials");
   EXPECT_EQ(wrong_place({{"materials", nullptr}}), "/materials");
   EXPECT_EQ(wrong_place({{"geometry", nullptr}}), "/geometry");

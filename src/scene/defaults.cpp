@@ -74,10 +74,12 @@ const std::vector<std::string>& names_of_sets() {
   return names;
 }
 
+bool is_polyfem_set(const Node& root) { return root["defaults"].choice(names_of_sets(), 0) % 2 == 1; }
+
 ChosenDefaults apply_defaults(Document& document) {
   ChosenDefaults chosen;
   const Node root(document);
-  const bool is_polyfem = root["defaults"].choice(names_of_sets(), 0) % 2 == 1;
+  const bool is_polyfem = is_polyfem_set(root);
   chosen.is_asked_for = root.has("defaults");
   chosen.name = is_polyfem ? kPolyfem : kItr;
   if (is_polyfem) {

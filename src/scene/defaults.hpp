@@ -24,6 +24,9 @@ std::span<const Default> itr_defaults();
 /// Names of the sets: "itr" and "polyfem" for the newest version of each, or with the version as in "itr-1".
 const std::vector<std::string>& names_of_sets();
 
+/// Whether a scene chooses PolyFEM's set.
+bool is_polyfem_set(const Node& root);
+
 /// Puts the set that a checked scene chooses into it, and tells which one and what.
 ChosenDefaults apply_defaults(Document& document);
 

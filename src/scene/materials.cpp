@@ -5,6 +5,8 @@
 #include <sstream>
 #include <utility>
 
+#include "defaults.hpp"
+#include "energy/elastic/law_table.hpp"
 #include "function.hpp"
 #include "readers.hpp"
 
@@ -14,20 +16,60 @@ namespace {
 
 /// How the laws are called, and which keys beside type, id and rho they have.
 struct LawName {
-  const char* type;
+  std::string type;
   MaterialLaw law;
   std::vector<std::string> keys;
+  const LawRow* row = nullptr;  ///< of a law that may be summed
 };
-const std::vector<std::string> kLinearKeys = {"E", "nu", "lambda", "mu", "plane_strain"};
-const std::vector<LawName> kLaws = {
-    {"NeoHookean", MaterialLaw::neo_hookean, kLinearKeys},
-    {"LinearElasticity", MaterialLaw::linear, kLinearKeys},
-    {"HookeLinearElasticity", MaterialLaw::linear, kLinearKeys},  // from E and nu its C is that of the Lame parameters
-    {"SaintVenant", MaterialLaw::saint_venant_kirchhoff, kLinearKeys},
-    {"FixedCorotational", MaterialLaw::fixed_corotated, kLinearKeys},
-    {"MooneyRivlin", MaterialLaw::mooney_rivlin, {"c1", "c2", "k"}},
-    {"MooneyRivlin3Param", MaterialLaw::mooney_rivlin, {"c1", "c2", "c3", "d1"}},
-};
+
+std::vector<LawName> name_laws() {
+  const std::vector<std::string> linear = {"E", "nu", "lambda", "mu", "plane_strain"};
+  std::vector<LawName> laws = {
+      {"NeoHookean", MaterialLaw::neo_hookean, linear},
+      {"LinearElasticity", MaterialLaw::linear, linear},
+      {"HookeLinearElasticity", MaterialLaw::linear, linear},  // from E and nu its C is that of the Lame parameters
+      {"SaintVenant", MaterialLaw::saint_venant_kirchhoff, linear},
+      {"FixedCorotational", MaterialLaw::fixed_corotated, linear},
+      {"MooneyRivlin", MaterialLaw::mooney_rivlin, {"c1", "c2", "k"}},
+      {"MooneyRivlin3Param", MaterialLaw::mooney_rivlin, {"c1", "c2", "c3", "d1"}},
+      {"MaterialSum", MaterialLaw::own, {"models", "plane_stress"}},
+  };
+  for (const LawRow& row : law_rows()) {
+    LawName law{row.type, MaterialLaw::own, {"plane_stress"}, &row};
+    for (const LawCoefficient& coefficient : row.coefficients) law.keys.emplace_back(coefficient.key);
+    if (row.has_lame) law.keys.insert(law.keys.end(), {"E", "nu"});
+    if (row.fibre) law.keys.emplace_back("fiber_direction");
+    if (law.type == "AMIPS") law.keys.emplace_back("use_rest_pose");
+    laws.push_back(law);
+  }
+  return laws;
+}
+const std::vector<LawName>& laws() {
+  static const std::vector<LawName> all = name_laws();
+  return all;
+}
+
+/// Reads the law of an entry, one of the terms of a sum if it is `in_sum`. Throws InputError for keys of other laws.
+const LawName& read_law(const Node& node, bool in_sum) {
+  if (!node.json().is_object()) node.fail("a material");
+  if (!node.has("type")) node["type"].fail("the material law");
+  std::vector<const LawName*> known;
+  std::vector<std::string> types;
+  for (const LawName& law : laws()) {
+    if (law.row ? law.row->only_in_sums && !in_sum : in_sum) continue;
+    known.push_back(&law);
+    types.push_back(law.type);
+  }
+  const LawName& law = *known[static_cast<std::size_t>(node["type"].choice(types, 0))];
+  const auto has = [&](const std::string& key) {
+    return std::find(law.keys.begin(), law.keys.end(), key) != law.keys.end();
+  };
+  for (const LawName& other : laws())
+    for (const std::string& key : other.keys)
+      if (node.has(key) && (!has(key) || (in_sum && key == "plane_stress")))
+        node[key].fail("a key that " + law.type + " does not have" + (in_sum ? " in a sum" : ""), "no such key");
+  return law;
+}
 
 /// A scalar of a material and what it must be. It outlives the scene that it was read from.
 struct Requirement {
@@ -52,19 +94,149 @@ struct Requirement {
 bool is_positive(double value) { return value > 0; }
 bool is_poisson_ratio(double value) { return value > -1 && value < 0.5; }
 
+bool is_in(LawCoefficient::Range range, double value) {
+  using Range = LawCoefficient::Range;
+  switch (range) {
+    case Range::positive:
+      return value > 0;
+    case Range::not_zero:
+      return value != 0;
+    case Range::share:
+      return value >= 0 && value <= 1;
+    case Range::third:
+      return value >= 0 && value <= 1.0 / 3;
+    case Range::compressible:
+      return is_poisson_ratio(value);
+    default:
+      return true;
+  }
+}
+const char* words_of(LawCoefficient::Range range) {
+  constexpr const char* kWords[] = {"a number",           "a number > 0",         "a number that is not 0",
+                                    "a number of [0, 1]", "a number of [0, 1/3]", "a number of (-1, 0.5)"};
+  return kWords[static_cast<std::size_t>(range)];
+}
+
+/// The value must meet `is_met`: at once if it is constant, else wherever it is used.
+Requirement requirement_of(const Node& node, ScalarValue value, bool (*is_met)(double), const char* expected) {
+  const Units& units = node.document().units;
+  Requirement requirement{
+      std::move(value),
+      is_met,
+      {node.document().file.string(), node.pointer(), node.exists() ? abbreviate(node.json()) : "nothing", expected},
+      units.factor(node.unit()),
+      units.factor("m")};
+  if (!requirement.value.function) requirement.check(Vec<3>::Zero());
+  return requirement;
+}
+
+/// Reads laws of the table, alone or in a MaterialSum.
+class SumReader {
+ public:
+  SumReader(const Node& node, int dimension) : node_(node), dimension_(dimension) {}
+
+  /// `invariants`: their dimension where the sum is not in plane stress.
+  LawSum read(const LawName& law, int invariants) {
+    LawSum sum;
+    sum.is_plane_stress = node_["plane_stress"].boolean(false);
+    if (sum.is_plane_stress && dimension_ == 3) node_["plane_stress"].fail("true in a 3D scene", "it in 2D only");
+    sum.dimension = sum.is_plane_stress ? 3 : invariants;
+    if (law.row) {
+      sum.terms.push_back(read_term(node_, *law.row, false, sum));
+      return sum;
+    }
+    if (node_["models"].items().empty()) node_["models"].fail("a list of laws");
+    for (const Node& model : node_["models"].items())
+      sum.terms.push_back(read_term(model, *read_law(model, true).row, true, sum));
+    return sum;
+  }
+  /// Lengths of directions.
+  std::vector<Requirement>& requirements() { return requirements_; }
+
+ private:
+  LawSum::Term read_term(const Node& node, const LawRow& row, bool in_sum, const LawSum& sum) {
+    LawSum::Term term{&row, read_coefficients(node, row, in_sum, sum.dimension)};
+    if (std::string_view(row.type) == "AMIPS" && !node["use_rest_pose"].boolean(false))
+      node["use_rest_pose"].fail("true: else the energy would depend on the mesh, which remeshing changes");
+    if (!row.fibre) return term;
+    if (sum.is_plane_stress) node_["plane_stress"].fail("true, with fibres", "false: fibres are in plane strain only");
+    term.direction = read_direction(node["fiber_direction"]);
+    return term;
+  }
+
+  /// As the row lists them.
+  static LawValues read_coefficients(const Node& node, const LawRow& row, bool in_sum, int dimension) {
+    if (row.has_lame && (node.has("E") || node.has("nu"))) {
+      if (node.has("lambda") || node.has("mu")) node.fail("E and nu, or lambda and mu, not both");
+      const double E = read_in_range(node["E"], LawCoefficient::Range::positive);
+      const double nu = read_in_range(node["nu"], LawCoefficient::Range::compressible);
+      return {{Material{.plane_strain = dimension == 3}.lame_lambda(E, nu, dimension)}, {Material::lame_mu(E, nu)}};
+    }
+    LawValues values;
+    for (const LawCoefficient& coefficient : row.coefficients) {
+      const Node value = node[coefficient.key];
+      if (!value.exists() && coefficient.fallback) {
+        values.push_back({*coefficient.fallback});
+      } else if (!value.exists() && in_sum && std::string_view(coefficient.key) == "K") {
+        values.push_back({0});
+      } else if (coefficient.is_list) {
+        if (value.items().empty()) value.fail("a list of numbers");
+        values.emplace_back();
+        for (const Node& item : value.items()) values.back().push_back(read_in_range(item, coefficient.range));
+        if (!coefficient.has_own_length && values.back().size() != values.front().size())
+          value.fail("a list of length " + std::to_string(values.back().size()),
+                     "that of " + std::string(row.coefficients[0].key) + ": " + std::to_string(values.front().size()));
+      } else {
+        values.push_back({read_in_range(value, coefficient.range)});
+      }
+    }
+    return values;
+  }
+
+  static double read_in_range(const Node& node, LawCoefficient::Range range) {
+    if (!node.exists()) node.fail(words_of(range));
+    const ScalarValue value = read_scalar(node, 0);
+    if (value.function) node.fail(std::string(words_of(range)) + ", a constant");
+    if (!std::isfinite(value.constant) || !is_in(range, value.constant)) node.fail(words_of(range));
+    return value.constant;
+  }
+
+  /// A fibre's direction, scaled to length 1. In 2D it may have a component across the plane.
+  std::function<Vec<3>(const Vec<3>&)> read_direction(const Node& node) {
+    const std::vector<Node> items = node.items();
+    if (static_cast<int>(items.size()) < dimension_ || items.size() > 3)
+      node.fail("the fibres' direction: a number or an expression for each component");
+    std::array<ScalarValue, 3> components;
+    bool varies = false;
+    for (std::size_t c = 0; c < items.size(); ++c) {
+      components[c] = read_scalar(items[c], 0);
+      varies = varies || components[c].function;
+    }
+    const auto at = [components](const Vec<3>& X) { return Vec<3>(components[0](X), components[1](X), components[2](X)); };
+    const SpaceFunction length = [at](const Vec<3>& X) { return at(X).norm(); };
+    requirements_.push_back(requirement_of(node, {length(Vec<3>::Zero()), varies ? length : SpaceFunction()}, is_positive,
+                                           "a direction of length > 0"));
+    return [at, wanted = requirements_.back()](const Vec<3>& X) {
+      if (wanted.value.function) wanted.check(X);
+      return Vec<3>(at(X).normalized());
+    };
+  }
+
+  Node node_;
+  int dimension_;
+  std::vector<Requirement> requirements_;
+};
+
 class MaterialReader {
  public:
-  MaterialReader(const Node& node, int dimension) : node_(node), dimension_(dimension) {
-    if (!node.json().is_object()) node.fail("a material");
-    std::vector<std::string> types;
-    types.reserve(std::size(kLaws));
-    for (const LawName& law : kLaws) types.push_back(law.type);
-    if (!node.has("type")) node["type"].fail("the material law");
-    const LawName& law = kLaws[node["type"].choice(types, 0)];
-    refuse_keys_of_others(law);
+  /// `invariants`: the dimension of sums' invariants.
+  MaterialReader(const Node& node, int dimension, int invariants) : node_(node), dimension_(dimension) {
+    const LawName& law = read_law(node, false);
     material_.law = law.law;
     if (law.law == MaterialLaw::mooney_rivlin)
       read_mooney_rivlin();
+    else if (law.law == MaterialLaw::own)
+      read_sum(law, invariants);
     else if (node.has("lambda") || node.has("mu"))
       read_lame();
     else
@@ -106,24 +278,8 @@ class MaterialReader {
   }
 
  private:
-  void refuse_keys_of_others(const LawName& law) const {
-    for (const LawName& other : kLaws)
-      for (const std::string& key : other.keys)
-        if (node_.has(key) && std::find(law.keys.begin(), law.keys.end(), key) == law.keys.end())
-          node_[key].fail("a modulus that " + std::string(law.type) + " does not have", "no such key");
-  }
-
-  /// The value must meet `is_met`: at once if it is constant, else wherever it is used.
   void require(const char* key, ScalarValue value, bool (*is_met)(double), const char* expected) {
-    const Node node = node_[key];
-    const Units& units = node.document().units;
-    requirements_.push_back(
-        {std::move(value),
-         is_met,
-         {node.document().file.string(), node.pointer(), node.exists() ? abbreviate(node.json()) : "nothing", expected},
-         units.factor(node.unit()),
-         units.factor("m")});
-    if (!requirements_.back().value.function) requirements_.back().check(Vec<3>::Zero());
+    requirements_.push_back(requirement_of(node_[key], std::move(value), is_met, expected));
   }
 
   ScalarValue read_required(const char* key) const {
@@ -215,6 +371,27 @@ class MaterialReader {
     material_.poisson_ratio = (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear));
   }
 
+  /// The sum, and E and nu of small strains without fibres.
+  void read_sum(const LawName& law, int invariants) {
+    SumReader reader(node_, dimension_);
+    LawSum sum = reader.read(law, invariants);
+    const auto [shear, bulk] = rest_moduli(sum);
+    const auto refuse = [&](const char* what, double found) {
+      std::ostringstream text;
+      text << "a " << what << " modulus of " << found / node_.document().units.factor("Pa") << " at rest";
+      node_.fail(text.str(), "one > 0" + std::string(law.row ? "" : " of the sum"));
+    };
+    if (!(shear > 0)) refuse("shear", shear);
+    if (!(bulk > 0)) refuse("bulk", bulk);
+    material_ = material_of(sum, dimension_);
+    for (Requirement& requirement : reader.requirements()) {
+      // A modulus that varies makes everybody ask for the law of each place.
+      if (requirement.value.function)
+        material_.youngs_modulus_at = [E = material_.youngs_modulus](const Vec<3>&) { return E; };
+      requirements_.push_back(std::move(requirement));
+    }
+  }
+
   Node node_;
   int dimension_;
   Material material_;
@@ -261,6 +438,12 @@ std::vector<std::pair<Label, int>> ids_of(const Node& entry, const LabelIds& bod
 
 }  // namespace
 
+LawSum read_law_sum(const Node& node, int dimension) {
+  const LawName& law = read_law(node, false);
+  if (law.law != MaterialLaw::own) node["type"].fail("a law from Yeoh on (docs/theory.md, \"Sums of laws\")");
+  return SumReader(node, dimension).read(law, dimension);
+}
+
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
                                        std::vector<std::string>& warnings) {
@@ -271,15 +454,16 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   for (const Node& entry : node.items())
     if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
       warnings.push_back(entry["rho"].pointer() + ": not given, so it is 1 kg/m^3");
+  const int invariants = is_polyfem_set(root) ? Dim : 3;
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
-    MaterialReader reader(node, Dim);
+    MaterialReader reader(node, Dim, invariants);
     for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
   std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
-    MaterialReader reader(entry, Dim);
+    MaterialReader reader(entry, Dim, invariants);
     for (const auto& [label, id] : ids_of(entry, bodies, points)) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);

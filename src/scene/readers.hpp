@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "energy/elastic/law_table.hpp"
 #include "geometry.hpp"
 #include "itr/scene.hpp"
 #include "itr/setup.hpp"
@@ -64,6 +65,9 @@ int read_quadrature_degree(const Node& root);
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
                                        std::vector<std::string>& warnings);
+
+/// The sum of laws that an entry of materials is, whether or not it is stable at rest. InputError for other laws.
+LawSum read_law_sum(const Node& node, int dimension);
 
 // `boundary_conditions`, `initial_conditions` and the motion of obstacles (docs/theory.md, "Conditions").
 

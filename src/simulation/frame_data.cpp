@@ -9,6 +9,7 @@
 
 #include "cell_stress.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
+#include "energy/elastic/law_sum.hpp"
 #include "energy/inertia.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
@@ -70,7 +71,7 @@ double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
 
 template <int Dim>
 double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Vec<Dim>& X) {
-  if (Dim == 3 || !material.plane_strain) return 0;
+  if (Dim == 3 || !material.plane_strain || (sum_of(material) && sum_of(material)->dimension == 2)) return 0;
   Mat<3> in_space = Mat<3>::Identity();
   in_space.template topLeftCorner<Dim, Dim>() = F;
   Vec<3> place = Vec<3>::Zero();
@@ -86,7 +87,8 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
     for (const auto& [F, X, fraction] : points) {
-      const Mat<Dim> here = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, X)) * F.transpose() / F.determinant();
+      const ElasticModuli moduli = elastic_moduli<Dim>(material, X);
+      const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, material));
       cauchy += fraction * here;
       equivalent += fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
     }

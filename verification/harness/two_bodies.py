@@ -47,8 +47,9 @@ def curved_edges(points, cells, quadratic):
     return np.array(sorted(edges_of(quadratic) - edges_of(~quadratic)))
 
 
-def two_bodies(folder, boxes, order=1):
-    """One after the other; `boxes` has counts of cells and size by dimension, `order` is that of the elements or MIXED."""
+def two_bodies(folder, boxes, order=1, of=laws):
+    """One after the other; `boxes` has counts of cells and size by dimension, `order` is that of the elements or MIXED, `of`
+    gives laws by dimension."""
     for dim, (counts, size) in boxes.items():
         points, cells = box_mesh(counts, size, jitter=0.25, seed=dim)
         bodies = np.where(points[cells].mean(axis=1)[:, 0] < size[0] / 2, 1, 2)
@@ -56,7 +57,7 @@ def two_bodies(folder, boxes, order=1):
         write_mesh(mesh, points, cells, bodies)
         by_cell = lambda values: np.asarray(values)[bodies - 1]
         curved = curved_edges(points, cells, bodies == 2) if order == MIXED else None
-        for name, law in laws(dim).items():
+        for name, law in of(dim).items():
             parameters = zip(*(law.parameters(material, dim) for material in law.scene))
             rho = by_cell([material["rho"] for material in law.scene])
             body = Body(points, cells, law.density, [by_cell(p) for p in parameters], rho,

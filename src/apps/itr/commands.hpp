@@ -45,6 +45,9 @@ int explain(const RunOptions& options);
 /// Prints what is known of a scene before it runs as one JSON object, all numbers in the scene's units.
 int print_facts(const RunOptions& options);
 
+/// Answers each line of its input, an object with a material and its principal logarithmic strains, by a line of responses.
+int respond();
+
 constexpr const char* kReportFile = "report.html";
 
 /// Shows the run, or the study, in a folder as one HTML file (empty: report.html in the folder) and says what it has.

@@ -12,6 +12,7 @@
 
 #include "advice.hpp"
 #include "core/connected_parts.hpp"
+#include "energy/elastic/law_table.hpp"
 #include "fem/quadrature.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
@@ -130,7 +131,8 @@ class Explanation {
       fmt::print("  id {}{}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id,
                  name == std::to_string(id) ? "" : " (" + name + ")", sum.cells,
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
-                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"), kLaws[static_cast<std::size_t>(material.law)],
+                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"),
+                 sum_of(material) ? sum_of(material)->name() : kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
                  units.from_si(material.density, "kg/m^3"), units.name("kg/m^3"),
                  units.text(material.density * sum.volume, "kg"));

@@ -143,7 +143,8 @@ void check_command(const CLI::App& app, int argc, char** argv) {
                     fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
 }
 
-/// Becomes the Python program of `itr study` or `itr sweep` (src/apps), which gets these arguments, the last of them null.
+/// Becomes the Python program of `itr study`, `itr sweep` or `itr fit` (src/apps), which gets these arguments, the last of
+/// them null.
 [[noreturn]] void become_python(const std::string& name, char** arguments) {
   namespace fs = std::filesystem;
   const fs::path program = fs::canonical("/proc/self/exe");
@@ -164,7 +165,7 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   for (; *arguments; ++arguments) words.push_back(*arguments);
   words.push_back(nullptr);
   execvp(python.c_str(), words.data());
-  throw InputError({"", name, "no program " + python, "Python: apt install python3 python3-matplotlib"});
+  throw InputError({"", name, "no program " + python, "Python: apt install python3 python3-matplotlib python3-scipy"});
 }
 
 void check_single_rank() {
@@ -218,10 +219,13 @@ int dispatch(int argc, char** argv) {
   app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
   app.add_subcommand("sweep",
                      "runs of a scene with other values, for GNU parallel or a job array, and their results in a table");
+  app.add_subcommand("fit", "coefficients of a law of rubber from several tests at once");
+  const std::string asked = argc > 1 ? argv[1] : "";
+  if (asked == "respond") return cli::respond();  // what `itr fit` asks
   check_command(app, argc, argv);
-  if (const std::string name = argc > 1 ? argv[1] : ""; name == "study" || name == "sweep") {
+  if (asked == "study" || asked == "sweep" || asked == "fit") {
     check_single_rank();
-    become_python(name, argv + 2);
+    become_python(asked, argv + 2);
   }
   try {
     app.parse(argc, argv);

@@ -41,17 +41,9 @@ SingularValues<3> singular_values(const Mat<3>& F) {
 }
 
 template <int Dim>
-EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const InvariantDerivatives& W) {
+EigenSystem<Dim> eigensystem_of(const SingularValues<Dim>& svd, const StretchStiffness<Dim>& stiffness) {
   const auto& [U, V, s] = svd;
-  const double J = s.prod();
-  Eigen::Matrix<double, Dim, 4> slope;  // of the invariants by s_i
-  for (int i = 0; i < Dim; ++i) slope.row(i) << 2 * s[i], 4 * s[i] * s[i] * s[i], 1, J / s[i];
-  const double W_a = W.first[InvariantDerivatives::a], W_q = W.first[InvariantDerivatives::q];
-  const double W_t = W.first[InvariantDerivatives::t], W_J = W.first[InvariantDerivatives::J];
-  Mat<Dim> scaling = slope * W.second * slope.transpose();
-  for (int i = 0; i < Dim; ++i)
-    for (int j = 0; j < Dim; ++j) scaling(i, j) += i == j ? 2 * W_a + 12 * s[i] * s[i] * W_q : W_J * J / (s[i] * s[j]);
-  const Eigen::SelfAdjointEigenSolver<Mat<Dim>> solver(scaling);
+  const Eigen::SelfAdjointEigenSolver<Mat<Dim>> solver(stiffness.scaling);
   EigenSystem<Dim> system;
   int k = 0;
   for (; k < Dim; ++k) {
@@ -59,19 +51,42 @@ EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const Inv
     system.modes[k] = U * solver.eigenvectors().col(k).asDiagonal() * V.transpose();
   }
   const double half = std::sqrt(0.5);
-  for (int i = 0; i < Dim; ++i)
-    for (int j = i + 1; j < Dim; ++j) {
+  for (int i = 0, pair = 0; i < Dim; ++i)
+    for (int j = i + 1; j < Dim; ++j, ++pair) {
       const Mat<Dim> first = half * U.col(i) * V.col(j).transpose(), second = half * U.col(j) * V.col(i).transpose();
-      const double squares = s[i] * s[i] + s[j] * s[j], product = s[i] * s[j], rest = W_J * J / product;
-      // (W_i - W_j) / (s_i - s_j) and (W_i + W_j) / (s_i + s_j), with the division carried out.
-      system.values[k] = 2 * W_a + 4 * W_q * (squares + product) - rest;
+      system.values[k] = stiffness.symmetric[pair];
       system.modes[k++] = first + second;
-      system.values[k] = 2 * W_a + 4 * W_q * (squares - product) + rest + 2 * W_t / (s[i] + s[j]);
+      system.values[k] = stiffness.skew[pair];
       system.modes[k++] = first - second;
     }
   return system;
 }
 
+template <int Dim>
+EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const InvariantDerivatives& W) {
+  const auto& s = svd.s;
+  const double J = s.prod();
+  Eigen::Matrix<double, Dim, 4> slope;  // of the invariants by s_i
+  for (int i = 0; i < Dim; ++i) slope.row(i) << 2 * s[i], 4 * s[i] * s[i] * s[i], 1, J / s[i];
+  const double W_a = W.first[InvariantDerivatives::a], W_q = W.first[InvariantDerivatives::q];
+  const double W_t = W.first[InvariantDerivatives::t], W_J = W.first[InvariantDerivatives::J];
+  StretchStiffness<Dim> stiffness;
+  stiffness.scaling = slope * W.second * slope.transpose();
+  for (int i = 0; i < Dim; ++i)
+    for (int j = 0; j < Dim; ++j)
+      stiffness.scaling(i, j) += i == j ? 2 * W_a + 12 * s[i] * s[i] * W_q : W_J * J / (s[i] * s[j]);
+  for (int i = 0, pair = 0; i < Dim; ++i)
+    for (int j = i + 1; j < Dim; ++j, ++pair) {
+      const double squares = s[i] * s[i] + s[j] * s[j], product = s[i] * s[j], rest = W_J * J / product;
+      // (W_i - W_j) / (s_i - s_j) and (W_i + W_j) / (s_i + s_j), with the division carried out.
+      stiffness.symmetric[pair] = 2 * W_a + 4 * W_q * (squares + product) - rest;
+      stiffness.skew[pair] = 2 * W_a + 4 * W_q * (squares - product) + rest + 2 * W_t / (s[i] + s[j]);
+    }
+  return eigensystem_of<Dim>(svd, stiffness);
+}
+
+template EigenSystem<2> eigensystem_of(const SingularValues<2>&, const StretchStiffness<2>&);
+template EigenSystem<3> eigensystem_of(const SingularValues<3>&, const StretchStiffness<3>&);
 template EigenSystem<2> isotropic_eigensystem(const SingularValues<2>&, const InvariantDerivatives&);
 template EigenSystem<3> isotropic_eigensystem(const SingularValues<3>&, const InvariantDerivatives&);
 

@@ -45,6 +45,17 @@ struct SingularValues {
 SingularValues<2> singular_values(const Mat<2>& F);
 SingularValues<3> singular_values(const Mat<3>& F);
 
+/// Second derivatives of W by singular values s, and the values of the symmetric and the skew mode of the pairs (0, 1),
+/// (0, 2), (1, 2): (W_i - W_j) / (s_i - s_j) and (W_i + W_j) / (s_i + s_j).
+template <int Dim>
+struct StretchStiffness {
+  static constexpr int kPairs = Dim * (Dim - 1) / 2;
+  Mat<Dim> scaling;
+  Vec<kPairs> symmetric, skew;
+};
+template <int Dim>
+EigenSystem<Dim> eigensystem_of(const SingularValues<Dim>& svd, const StretchStiffness<Dim>& stiffness);
+
 /// Modes and values: d of scaling, with the eigenvalues of d2W/ds_i ds_j, and a symmetric and a skew one for each pair.
 template <int Dim>
 EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const InvariantDerivatives& W);

@@ -11,6 +11,7 @@
 #include "core/check.hpp"
 #include "isotropic.hpp"
 #include "itr/core.hpp"
+#include "law_sum.hpp"
 #include "point.hpp"
 
 namespace itr {
@@ -61,13 +62,7 @@ template <int Dim>
 EigenSystem<Dim> own_eigensystem(const Mat<Dim>& F, const OwnLaw& law) {
   MatrixX H(Dim * Dim, Dim * Dim);
   law.hessian(F, H);
-  const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(H);
-  EigenSystem<Dim> system;
-  for (int k = 0; k < Dim * Dim; ++k) {
-    system.values[k] = eigen.eigenvalues()[k];
-    system.modes[k] = Eigen::Map<const Mat<Dim>>(eigen.eigenvectors().col(k).data());
-  }
-  return system;
+  return decompose<Dim>(H);
 }
 
 /// The value of a function of a material at X. Throws InputError unless it lies in (low, high), as Setup::validate asks of
@@ -87,10 +82,12 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
   if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0, kInfinity);
   if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1, 0.5);
-  return {material.law,
-          {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
-          material.mooney_rivlin,
-          material.own.get()};
+  ElasticModuli moduli{material.law,
+                       {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
+                       material.mooney_rivlin,
+                       material.own.get()};
+  if (sum_of(moduli)) set_place(in_space<Dim>(X), moduli);
+  return moduli;
 }
 
 template <int Dim>
@@ -114,6 +111,7 @@ double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli&
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_density<Dim>(G, lame);
     case MaterialLaw::own:
+      if (const LawSum* sum = sum_of(moduli)) return sum_density<Dim>(G, *sum, place_of(moduli));
       return moduli.own->density(at.F());
     default:
       return mooney_rivlin_density<Dim>(G, moduli.mooney_rivlin);
@@ -138,6 +136,7 @@ Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_stress<Dim>(G, lame);
     case MaterialLaw::own: {
+      if (const LawSum* sum = sum_of(moduli)) return sum_stress<Dim>(G, *sum, place_of(moduli));
       MatrixX P(Dim, Dim);
       moduli.own->stress(at.F(), P);
       return P;
@@ -151,7 +150,10 @@ template <int Dim>
 EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli) {
   if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_eigensystem<Dim>(F, moduli.lame);
   if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
-  if (moduli.law == MaterialLaw::own) return own_eigensystem<Dim>(F, *moduli.own);
+  if (moduli.law == MaterialLaw::own) {
+    const LawSum* sum = sum_of(moduli);
+    return sum ? sum_eigensystem<Dim>(F, *sum, place_of(moduli)) : own_eigensystem<Dim>(F, *moduli.own);
+  }
   const SingularValues<Dim> svd = singular_values(F);
   switch (moduli.law) {
     case MaterialLaw::saint_venant_kirchhoff:

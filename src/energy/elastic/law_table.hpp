@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// The table of laws that may be summed (docs/theory.md, "Sums of laws"): a row has the law's type and coefficients, as
+// scenes call them, and its energy density. A scene's reader, derivatives and tests are made of the rows.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "itr/options.hpp"
+
+namespace itr {
+
+class StretchResponse;
+
+/// A coefficient of a law, or a list of them.
+struct LawCoefficient {
+  enum class Range { any, positive, not_zero, share, third, compressible };
+
+  const char* key;
+  Range range;
+  bool is_list = false;                           ///< of one length with the law's first list, unless `has_own_length`
+  std::optional<double> fallback = std::nullopt;  ///< where a scene leaves it out; K may be left out in a sum
+  bool has_own_length = false;
+};
+
+/// By coefficient of the row: its number, or its list.
+using LawValues = std::vector<std::vector<double>>;
+
+/// A fibre's energy density w(x) and its derivatives; x = M : C J^(-2/d) - 1, M the fibre's structure tensor.
+struct FibreResponse {
+  double value, first, second;
+};
+
+/// One law: isotropic, by `add`, or a fibre.
+struct LawRow {
+  const char* type;
+  std::vector<LawCoefficient> coefficients;
+  void (*add)(const LawValues& values, StretchResponse& response) = nullptr;
+  FibreResponse (*fibre)(const LawValues& values, double x) = nullptr;
+  bool has_lame = false;      ///< its two coefficients are lambda and mu, which E and nu may stand for
+  bool only_in_sums = false;  ///< alone another implementation stands for its type
+  int dispersion = -1;        ///< of a fibre: which coefficient is kappa of M = kappa I + (1 - d kappa) a a^T; -1: 0
+};
+std::span<const LawRow> law_rows();
+
+/// A sum of laws, the own law of a material.
+class LawSum final : public OwnLaw {
+ public:
+  struct Term {
+    const LawRow* row;
+    LawValues values;
+    std::function<Vec<3>(const Vec<3>& X)> direction{};  ///< of a fibre at rest position X, of length 1
+  };
+  std::vector<Term> terms;  ///< isotropic ones first
+  int dimension = 3;        ///< d of all invariants; 2: PolyFEM's in 2D
+  bool is_plane_stress = false;
+
+  std::string name() const;
+
+  // At the origin, as programs ask. Energies take sum_density and its like, which are more precise and know the place.
+  double density(const Eigen::Ref<const MatrixX>& F) const override;
+  void stress(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> P) const override;
+  void hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) const override;
+};
+
+/// The sum that is a material's own law; null if it has another law.
+inline const LawSum* sum_of(const Material& material) { return dynamic_cast<const LawSum*>(material.own.get()); }
+
+/// Shear and bulk modulus (in 2 dimensions lambda + mu) of the isotropic part at rest [Pa].
+struct RestModuli {
+  double shear, bulk;
+};
+RestModuli rest_moduli(const LawSum& sum);
+
+/// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
+Material material_of(const LawSum& sum, int dim);
+
+}  // namespace itr

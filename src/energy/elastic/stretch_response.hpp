@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// Isotropic energy densities as functions of the principal logarithmic strains e_i = ln s_i of F. They are made of sums of
+// powers of stretches, in which neither values nor derivatives cancel at small strains or at equal stretches.
+#pragma once
+
+#include "itr/types.hpp"
+
+namespace itr {
+
+/// A symmetric function of the strains, with its derivatives by them.
+struct StretchSum {
+  double value = 0;
+  Vec<3> first = Vec<3>::Zero();
+  Mat<3> second = Mat<3>::Zero();
+  Vec<3> divided = Vec<3>::Zero();  ///< [k]: (first[i] - first[j]) / (e_i - e_j) of the other two, its limit where e_i = e_j
+};
+
+/// sinh(x) / x.
+double sinh_ratio(double x);
+
+/// Accumulates W at given strains. `first` are then principal Kirchhoff stresses [Pa].
+class StretchResponse {
+ public:
+  /// `dimension`: how many stretches the law has, 3, or 2 where those in the plane are all. `log_J` is their sum.
+  StretchResponse(int dimension, const Vec<3>& strains, double log_J)
+      : dimension_(dimension), strains_(strains), log_J_(log_J) {}
+
+  int dimension() const { return dimension_; }
+  double log_J() const { return log_J_; }
+  const StretchSum& sum() const { return sum_; }
+
+  /// sum_i (t_i^alpha - 1) of isochoric stretches t_i = J^(-1/dimension) s_i.
+  StretchSum isochoric_powers(double alpha) const;
+  /// sum_i (s_i^alpha - 1) - alpha ln J.
+  StretchSum powers(double alpha) const;
+  /// sum_i e_i^2.
+  StretchSum squares() const;
+
+  /// Adds f(S); `d1`, `d2`: f' and f''.
+  void add(double f, double d1, double d2, const StretchSum& S);
+  void add(double factor, const StretchSum& S) { add(factor * S.value, factor, 0, S); }
+  /// Adds U(ln J) with its derivatives by ln J.
+  void add_volume(double U, double d1, double d2);
+
+ private:
+  StretchSum powers_of(double alpha, const Vec<3>& strains) const;
+
+  int dimension_;
+  Vec<3> strains_;
+  double log_J_;
+  StretchSum sum_;
+};
+
+}  // namespace itr
