@@ -23,6 +23,9 @@ namespace {
 
 constexpr double kSoftness = 0.1;          ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
 constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, little beside usual deformations
+/// Where prescribed motions press bodies without inertia, gaps add to what these are compressed by. Curved edges would need
+/// chords that are too short.
+constexpr double kDhatByThicknessIfPressed = 2e-4;
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
 constexpr double kLeastDhat = 0.01;     ///< of that without the gap: what nearly touches presses a little at the start
 constexpr double kDhatByMotion = 0.01;  ///< of the way that is prescribed without inertia
@@ -137,8 +140,8 @@ std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& co
                      units.text(is_by_fall ? fall : prescribed, "m/s", 3));
 }
 
-/// A thousandth of the thinnest body, a tenth of the shortest surface edge, a hundredth of what is prescribed without
-/// inertia, and less than the gap at the start.
+/// A thousandth of the thinnest body, or less where prescribed motions press it, a tenth of the shortest surface edge, a
+/// hundredth of what is prescribed without inertia, and less than the gap at the start.
 template <int Dim>
 std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
   double thinnest = std::numeric_limits<double>::infinity(), shortest = thinnest;
@@ -153,7 +156,11 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
   const Units& units = setup.units;
   double& dhat = contact.dhat;
   const double motion = setup.time.has_inertia() ? std::numeric_limits<double>::infinity() : prescribed_motion(setup);
-  dhat = std::min({kDhatByThickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * motion});
+  const bool has_curves =
+      setup.remesh.curve.enabled || std::ranges::any_of(setup.order, [](const auto& entry) { return entry.second > 1; });
+  const bool is_pressed = std::isfinite(motion) && !has_curves;
+  const double by_thickness = is_pressed ? kDhatByThicknessIfPressed : kDhatByThickness;
+  dhat = std::min({by_thickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * motion});
   double gap = std::numeric_limits<double>::infinity();
   if (!setup.proxy) {
     Workspace workspace;
@@ -165,9 +172,8 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }
   return fmt::format(
-      "d-hat {}: a thousandth of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}; /contact/dhat sets "
-      "another",
-      units.text(dhat, "m"), units.text(thinnest, "m"), units.text(shortest, "m"),
+      "d-hat {}: {:g} of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}; /contact/dhat sets another",
+      units.text(dhat, "m"), by_thickness, units.text(thinnest, "m"), units.text(shortest, "m"),
       std::isfinite(motion) ? ", at most a hundredth of what is prescribed, " + units.text(motion, "m") : "",
       std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "geometry/rotation.hpp"
+#include "mesh/rest_box.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/named.hpp"
@@ -19,6 +20,7 @@ namespace {
 constexpr double kMostRotation = 5;        ///< of linear elasticity [degrees]: strains are off by 4e-3 there
 constexpr double kForceError = 0.01;       ///< relative, from which it is said
 constexpr double kReactionLeft = 0.3;      ///< of the largest reaction: less is left where reactions are right to 1 %
+constexpr double kNoForce = 1e-12;         ///< of what strains of 1 take: less is round-off of bodies that nothing presses
 constexpr int kLooseSteps = 3;             ///< in a row
 constexpr double kGapFraction = 0.03;      ///< of the way that bodies are compressed, from which gaps are told of
 constexpr double kNoStrain = 1e-6;         ///< below it the energy of bodies is taken for none
@@ -140,7 +142,9 @@ void Watch<Dim>::find_unbalanced_reactions(const Setup<Dim>& setup, const StepRe
   };
   largest_reaction_ = std::max(largest_reaction_, largest(forces.reaction));
   const double left = largest(forces.residual);
-  unbalanced_steps_ = left > kReactionLeft * largest_reaction_ && largest_reaction_ > 0 ? unbalanced_steps_ + 1 : 0;
+  const double least = kNoForce * stiffness(setup) / rest_box(setup.mesh).sizes().norm();
+  const bool counts = left > std::max(least, kReactionLeft * largest_reaction_) && largest_reaction_ > 0;
+  unbalanced_steps_ = counts ? unbalanced_steps_ + 1 : 0;
   if (unbalanced_steps_ < kLooseSteps && !(unbalanced_steps_ > 0 && setup.time.is_over(report.step, report.t))) return;
   has_said_reactions_ = true;
   logger.warning(fmt::format(

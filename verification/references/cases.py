@@ -117,7 +117,9 @@ class Change:
     positions: float | None = 0.0
 
 
-PLANNED: list[Change] = []
+PLANNED: list[Change] = [
+    Change("d-hat is a fifth of what it was where motions are prescribed without inertia", ("press-statics",),
+           ("frames", "states", "reports", "forces"), energy=0.05, counts=0.5, positions=None)]
 
 
 def planned(name):
