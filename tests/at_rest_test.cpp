@@ -5,10 +5,10 @@
 
 #include <cmath>
 
+#include "apps/itr/resolution.hpp"
 #include "itr/core.hpp"
 #include "itr/solver.hpp"
 #include "random_tets.hpp"
-#include "simulation/resolution.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {
@@ -249,7 +249,7 @@ TEST(Resolution, IsToldWhereStepsOrStrainsAreBelowIt) {
     setup.time.dt = dt;
     linear::Registry registry;
     std::vector<std::string> found;
-    find_unresolved(Simulation<2>(setup, registry), found);
+    cli::find_unresolved(Simulation<2>(setup, registry), found);
     return found.size();
   };
   EXPECT_EQ(count(1e-3, 1, 1e6), 0u);
@@ -266,7 +266,7 @@ TEST(Resolution, OfALongStepIsThatOfTheBodyAtRestWhereConditionsHoldIt) {
     setup.time.dt = 10;
     linear::Registry registry;
     std::vector<std::string> found;
-    find_unresolved(Simulation<2>(setup, registry), found);
+    cli::find_unresolved(Simulation<2>(setup, registry), found);
     EXPECT_EQ(found.size(), is_held ? 1u : 0u);
   }
 }
@@ -277,7 +277,7 @@ TEST(Resolution, WithoutInertiaIsNoMatterOfAVelocity) {
   setup.time.quasistatic = true;
   linear::Registry registry;
   std::vector<std::string> found;
-  find_unresolved(Simulation<2>(setup, registry), found);
+  cli::find_unresolved(Simulation<2>(setup, registry), found);
   EXPECT_TRUE(found.empty());
 }
 

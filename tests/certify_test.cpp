@@ -9,6 +9,7 @@
 
 #include "itr/core.hpp"
 #include "output/certify.hpp"
+#include "temporary_path.hpp"
 #include "written_scenes.hpp"
 
 namespace itr::output {
@@ -19,8 +20,7 @@ namespace fs = std::filesystem;
 class CertifyTest : public testing::Test {
  protected:
   void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder = fs::path(testing::TempDir()) / ("itr_certify_" + std::string(test->name()));
+    folder = temporary_path();
     fs::remove_all(folder);
   }
   void TearDown() override { fs::remove_all(folder); }

@@ -13,6 +13,7 @@
 #include "simulation/contact_surface.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/state.hpp"
+#include "simulation/watch.hpp"
 #include "square_mesh.hpp"
 
 namespace itr {
@@ -218,6 +219,17 @@ TEST(ChordBound, CountsWhatIsNearACurve) {
   for (int i = 0; i < 2; ++i) vertex_of<2>(x, mesh.num_nodes() + i)[1] = -1.006;
   ChordDemand demand = find_chord_demand(setup, mesh, {}, x);
   EXPECT_GT(demand.excess, 1);
+
+  int told = 0;
+  const Logger logger([&](LogLevel level, std::string_view message) {
+    told += level == LogLevel::warning && message.find("can have no shorter chords") != message.npos;
+  });
+  State<2> state{.mesh = mesh, .history = {}};
+  state.history.x = {x};
+  Watch<2> watch;
+  for (int step = 0; step < 2; ++step) watch.look(setup, state, {}, {}, logger);
+  EXPECT_EQ(told, 1);
+
   EXPECT_GT(demand.levels[edge], 0);
   for (int round = 0; round < 4 && demand.excess > 1; ++round) demand = find_chord_demand(setup, mesh, demand.levels, x);
   EXPECT_LE(demand.excess, 1);

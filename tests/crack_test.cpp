@@ -28,6 +28,7 @@
 #include "simulation/invariants.hpp"
 #include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
+#include "temporary_path.hpp"
 
 namespace itr {
 namespace {
@@ -341,13 +342,15 @@ TEST(Cracks, AreNoContactWhereTheyOpenALittle3D) { check_small_openings<3>(); }
 
 template <int Dim>
 State<Dim> written_and_read(const Simulation<Dim>& simulation) {
-  const std::filesystem::path path = std::filesystem::path(testing::TempDir()) / fmt::format("crack_test_{}.h5", Dim);
+  const std::filesystem::path path = temporary_path(".h5");
   simulation.observe([&](const FrameView<Dim>& frame) {
     output::write_frame(path, frame, simulation.state().step, simulation.state().t, {}, [&](hdf5::File& file) {
       output::write_checkpoint(file, simulation.state(), {"{}", "eigen", "{}", 0});
     });
   });
-  return *output::read_checkpoint<Dim>({path, "{}", "eigen", Dim}).state;
+  const auto read = output::read_checkpoint<Dim>({path, "{}", "eigen", Dim});
+  std::filesystem::remove(path);
+  return *read.state;
 }
 
 /// Cracks open far, and are pressed together then. Parts of cracks that are not plane close at once.

@@ -13,6 +13,7 @@
 #include "mesh/refine.hpp"
 #include "output/frame_file.hpp"
 #include "output/surface_distance.hpp"
+#include "temporary_path.hpp"
 
 namespace itr::output {
 namespace {
@@ -30,8 +31,7 @@ Mesh<2> square(bool other_diagonal, int body = 1) {
 class DistanceTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder = fs::path(testing::TempDir()) /
-             ("itr_distance_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    folder = temporary_path();
     fs::create_directories(folder / "frames");
   }
   void TearDown() override { fs::remove_all(folder); }

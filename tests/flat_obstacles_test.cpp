@@ -14,6 +14,7 @@
 #include "output/frame_file.hpp"
 #include "random_cube.hpp"
 #include "simulation_scenes.hpp"
+#include "temporary_path.hpp"
 
 namespace itr {
 namespace {
@@ -169,7 +170,7 @@ TEST(FlatObstacles, AreAsTheyWereAfterRestoringAndFailedSteps) {
 
   // From a file.
   simulation.restore(middle);
-  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "flat_obstacles.h5";
+  const std::filesystem::path path = temporary_path(".h5");
   simulation.observe([&](const FrameView<2>& frame) {
     output::write_frame(path, frame, 20, simulation.state().t, {}, [&](hdf5::File& file) {
       output::write_checkpoint(file, simulation.state(), {"{}", "eigen", "{}", 0});

@@ -18,6 +18,7 @@
 #include "core/hdf5.hpp"
 #include "itr/core.hpp"
 #include "output/files.hpp"
+#include "temporary_path.hpp"
 
 namespace itr::output {
 namespace {
@@ -40,8 +41,7 @@ herr_t add_name(hid_t, const char* name, const H5L_info_t* info, void* names) {
 class FrameLinksTest : public testing::Test {
  protected:
   FrameLinksTest() {
-    folder = fs::path(testing::TempDir()) /
-             ("itr_frame_links_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    folder = temporary_path();
     fs::remove_all(folder);
     fs::create_directories(folder / "frames");
   }

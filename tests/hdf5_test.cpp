@@ -11,6 +11,7 @@
 
 #include "core/hdf5.hpp"
 #include "itr/core.hpp"
+#include "temporary_path.hpp"
 
 namespace itr::hdf5 {
 namespace {
@@ -48,8 +49,7 @@ class Hdf5Test : public ::testing::Test {
     return refusal([&] { File::open(path).read_doubles(name); });
   }
 
-  const fs::path folder = fs::path(testing::TempDir()) /
-                          ("itr_hdf5_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+  const fs::path folder = temporary_path();
 };
 
 Handle make_dataset(hid_t file, const char* name, const std::array<hsize_t, 2>& extent, hid_t properties, hid_t type) {

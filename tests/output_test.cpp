@@ -16,6 +16,7 @@
 #include "core/process.hpp"
 #include "itr/core.hpp"
 #include "itr/output.hpp"
+#include "temporary_path.hpp"
 #include "written_scenes.hpp"
 
 namespace itr::output {
@@ -62,8 +63,7 @@ int count_of(const std::string& text, const std::string& what) {
 class OutputTest : public testing::Test {
  protected:
   void SetUp() override {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder = fs::path(testing::TempDir()) / ("itr_output_" + std::string(test->name()));
+    folder = temporary_path();
     fs::remove_all(folder);
   }
   void TearDown() override { fs::remove_all(folder); }

@@ -138,7 +138,8 @@ class Architecture(unittest.TestCase):
             self.assertTrue((SOURCE / f"tests/{name}.cpp").is_file(), name)
 
     def test_names_are_those_of_the_code(self):
-        code = "\n".join(path.read_text() for folder in ["include", "src"] for path in (SOURCE / folder).rglob("*.[ch]pp"))
+        code = "\n".join(path.read_text() for folder in ["include", "src", "backends"]
+                         for path in (SOURCE / folder).rglob("*.[ch]pp"))
         words = set(re.findall(r"\w+", code))
         for quoted in re.findall(r"`([A-Za-z_:]+(?:\(\))?)`", self.text):
             for name in re.findall(r"\w+", quoted):

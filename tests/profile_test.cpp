@@ -98,6 +98,24 @@ TEST(Profile, PredictsTimesByWorkAndLongestBlocks) {
   }
 }
 
+/// With several cores a phase beside the others takes only what it is longer than they are.
+TEST(Profile, PredictsThatAPhaseRunsBesideTheOthers) {
+  for (const double seconds : {2e-3, 12e-3}) {
+    Profile profile;
+    {
+      const Profile::Active active(&profile);
+      const auto beside = ScopedPhase::beside("output");
+      spin(seconds);
+    }
+    spin(6e-3);
+    const auto times = profile.take();
+    const PhaseTimes output = find(times, "output"), rest = find(times, "rest");
+    EXPECT_GE(output.work, seconds);
+    for (const double predicted : output.predicted)
+      EXPECT_DOUBLE_EQ(predicted, std::max(0.0, output.wall - rest.wall)) << seconds;
+  }
+}
+
 TEST(Profile, IsNoneWhereNobodyAsks) {
   EXPECT_EQ(Profile::active(), nullptr);
   const ScopedPhase phase("nothing");

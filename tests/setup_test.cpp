@@ -12,9 +12,9 @@
 #include <string>
 #include <utility>
 
+#include "apps/itr/advice.hpp"
 #include "itr/core.hpp"
 #include "itr/solver.hpp"
-#include "simulation/advice.hpp"
 #include "simulation/step_problem.hpp"
 #include "square_mesh.hpp"
 
@@ -236,7 +236,7 @@ TEST(Advice, SaysWhatWillHappenAndWhatLooksWrong) {
   linear::Registry registry;
   itr::Setup<2> setup = good_setup();
   setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, 9.81); };
-  const auto words = foretell(setup);
+  const auto words = cli::foretell(setup);
   const auto has = [](const std::vector<std::string>& list, const std::string& text) {
     return std::any_of(list.begin(), list.end(), [&](const auto& line) { return line.find(text) != line.npos; });
   };
@@ -246,27 +246,28 @@ TEST(Advice, SaysWhatWillHappenAndWhatLooksWrong) {
   // c = sqrt((lambda + 2 mu) / rho), of plane stress
   const double c = std::sqrt((1e4 * 0.4 / (1 - 0.16) + 1e4 / 1.4) / 1000);
   EXPECT_TRUE(has(words, "waves run at up to " + std::to_string(c).substr(0, 4)));
-  EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "rhs pushes in the negative direction"));
+  EXPECT_TRUE(has(cli::find_suspicious(Simulation<2>(setup, registry)), "rhs pushes in the negative direction"));
   setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -9.81); };
-  EXPECT_TRUE(find_suspicious(Simulation<2>(setup, registry)).empty());
+  EXPECT_TRUE(cli::find_suspicious(Simulation<2>(setup, registry)).empty());
   const ContactOptions contact = setup.contact;
   setup.contact.enabled = setup.contact.convergent = true;
   for (const auto& [stiffness, is_odd] : {std::pair(1e3, false), std::pair(1e6, true), std::pair(1e1, true)}) {
     setup.contact.barrier_stiffness = stiffness;  // `auto` takes E / 10
-    EXPECT_EQ(has(find_suspicious(Simulation<2>(setup, registry)), "barrier stiffness"), is_odd) << stiffness;
+    EXPECT_EQ(has(cli::find_suspicious(Simulation<2>(setup, registry)), "barrier stiffness"), is_odd) << stiffness;
   }
   setup.contact = contact;
   setup.materials[1].density = 1.1;
-  EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "are densities in kg/m^3?"));
+  EXPECT_TRUE(has(cli::find_suspicious(Simulation<2>(setup, registry)), "are densities in kg/m^3?"));
   setup.time.quasistatic = true;
-  EXPECT_TRUE(has(find_suspicious(Simulation<2>(setup, registry)), "only contact can keep them in place"));
+  EXPECT_TRUE(has(cli::find_suspicious(Simulation<2>(setup, registry)), "only contact can keep them in place"));
 }
 
 /// Sentences of find_suspicious that have these words.
 int count_words(const itr::Setup<2>& setup, const std::string& words) {
   linear::Registry registry;
   int count = 0;
-  for (const std::string& line : find_suspicious(Simulation<2>(setup, registry))) count += line.find(words) != line.npos;
+  for (const std::string& line : cli::find_suspicious(Simulation<2>(setup, registry)))
+    count += line.find(words) != line.npos;
   return count;
 }
 

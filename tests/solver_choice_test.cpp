@@ -248,14 +248,14 @@ TEST(Choice, ChecksFallbacksAndOptionsBeforeAnythingRuns) {
             "");  // an absent fallback only warns
 }
 
-/// Under the name that auto takes for large systems: notes its options, or cannot be created.
-void add_large(Registry& registry, SolverOptions* seen) {
+/// Under a name that auto takes for large systems: notes its options, or cannot be created.
+void add_large(Registry& registry, SolverOptions* seen, const std::string& name = "cholmod") {
   BackendInfo info;
-  info.name = "cholmod";
+  info.name = name;
   registry.add(info, [=](const SolverOptions& options) -> std::unique_ptr<Solver> {
     if (!seen) throw InputError({"", "linear solver", "no licence", "a licence"});
     *seen = options;
-    return make_checked_solver("cholmod", {}, std::make_unique<Scripted>(Scripted::Script{}));
+    return make_checked_solver(name, {}, std::make_unique<Scripted>(Scripted::Script{}));
   });
 }
 
@@ -265,7 +265,7 @@ TEST(Auto, HandsOptionsToWhatItPicks) {
     Registry registry(kNoModules);
     add(registry, "weak", {.analyze = Outcome::failed});
     SolverOptions seen;
-    add_large(registry, &seen);
+    add_large(registry, &seen, as_fallback ? "cholmod" : "cholmod:tasks");  // which has the options of cholmod
     LinearOptions options;
     options.solvers = {as_fallback ? "weak" : "auto"};
     if (as_fallback) options.fallback = {"auto"};
@@ -301,7 +301,8 @@ auto there(std::set<std::string> names) {
 }
 
 TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
-  const auto all = there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
+  const auto all =
+      there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "cholmod:tasks", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
   const auto none = there({"eigen:ldlt", "dense", "eigen:cg"});
   constexpr double kGiB = 1024.0 * 1024 * 1024;
   const MatrixTraits tiny{30, 200, 2, false, kGiB}, small{2000, 16'000, 2, false, kGiB},
@@ -309,8 +310,10 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
       indefinite{200'000, 1'600'000, 2, true, 64 * kGiB}, huge{3'000'000, 70'000'000, 3, false, 16 * kGiB};
   EXPECT_EQ(pick_solver(tiny, all).name, "dense");
   EXPECT_EQ(pick_solver(small, all).name, "eigen:ldlt");
-  EXPECT_EQ(pick_solver(large, all).name, "cholmod");
-  EXPECT_EQ(pick_solver(large_3d, all).name, "cholmod");
+  EXPECT_EQ(pick_solver(large, all).name, "cholmod:tasks");
+  EXPECT_EQ(pick_solver(large_3d, all).name, "cholmod:tasks");
+  EXPECT_EQ(pick_solver({30'000, 700'000, 3, false, 3e9, 2e9}, all).name, "cholmod");  // contributions would not fit
+  EXPECT_EQ(pick_solver(large_3d, there({"cholmod", "eigen:ldlt"})).name, "cholmod");
   EXPECT_EQ(pick_solver(large_3d, there({"eigen:ldlt", "mumps:spd"})).name, "mumps:spd");
   EXPECT_EQ(pick_solver(large, none).name, "eigen:ldlt");
   EXPECT_EQ(pick_solver(indefinite, all).name, "mumps");
@@ -325,7 +328,7 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
 /// A long thin body: many unknowns whose factors are far smaller than those of a cube.
 TEST(Auto, AsksAnAnalysisWhereACubeWouldNotFit) {
   Registry registry;
-  if (!registry.is_ready("cholmod")) GTEST_SKIP() << "cholmod: " << registry.find("cholmod").reason;
+  if (!registry.is_ready("cholmod:tasks")) GTEST_SKIP() << "cholmod:tasks: " << registry.find("cholmod:tasks").reason;
   SparsityPattern chain;
   chain.order = 1 << 16;
   while (estimate_factor_bytes({chain.order, 0, 3, false, 0}) <
@@ -337,10 +340,10 @@ TEST(Auto, AsksAnAnalysisWhereACubeWouldNotFit) {
       if (i < chain.order) chain.row_indices.push_back(i);
     chain.column_starts.push_back(static_cast<int>(chain.row_indices.size()));
   }
-  ASSERT_NE(pick_solver({chain.order, chain.nonzeros(), 3, false, 0}, registry).name, "cholmod");
+  ASSERT_NE(pick_solver({chain.order, chain.nonzeros(), 3, false, 0}, registry).name, "cholmod:tasks");
   const auto solver = make_auto_solver(registry, false, {});
   EXPECT_EQ(solver->analyze(chain, {.block_size = 3}), Outcome::ok);
-  EXPECT_EQ(solver->name_in_use(), "cholmod");
+  EXPECT_EQ(solver->name_in_use(), "cholmod:tasks");
   EXPECT_EQ(pick_solver({chain.order, chain.nonzeros(), 3, false, 1e9, 2e9}, there({"cholmod", "belos:muelu"})).name,
             "belos:muelu");
 }
@@ -355,7 +358,7 @@ TEST(Auto, AsksOnlyAboutSolversInQuestion) {  // an answer may load a module of 
   pick_solver({2000, 16'000, 2, false, kMemory}, all);
   EXPECT_TRUE(asked.empty());
   pick_solver({30'000, 700'000, 3, false, kMemory}, all);
-  EXPECT_EQ(asked, std::vector<std::string>{"cholmod"});
+  EXPECT_EQ(asked, std::vector<std::string>{"cholmod:tasks"});
 }
 
 // Fill of the squares and cubes of verification/scaling/results.csv, METIS.

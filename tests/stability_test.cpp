@@ -85,6 +85,32 @@ TEST(Stability, APulledStripStaysLinear) {
   EXPECT_FALSE(run(setup).state.mesh.has_nodes());
 }
 
+/// Between rough plates a column stands as if it were clamped, up to four times the load that it bears between smooth ones.
+TEST(Stability, AColumnThatFrictionHoldsStaysLinearBelowItsLoad) {
+  auto setup = column();
+  setup.dirichlet.clear();
+  for (const double x : {-1e-3, kLength + 1e-3}) {
+    const int first = static_cast<int>(setup.obstacles.rest.size());
+    setup.obstacles.rest.insert(setup.obstacles.rest.end(), {{x, -kLength}, {x, kLength}});
+    setup.obstacles.edges.push_back({first, first + 1});
+    setup.obstacles.motion.insert(setup.obstacles.motion.end(), 2, x < 0 ? kNone : 0);
+  }
+  const double of_euler = 0.5 * std::pow(std::numbers::pi * kThickness / kLength, 2) / 3 * kLength;
+  setup.obstacles.motions = {[of_euler](const Vec<2>&, double t) { return Vec<2>(-(2e-3 + of_euler) * t, 0); }};
+  setup.contact = {.enabled = true,
+                   .dhat = 1e-3,
+                   .convergent = true,
+                   .barrier_stiffness = 0,
+                   .friction_coefficient = 0.5,
+                   .friction_velocity = 0,
+                   .friction_iterations = -1};
+  setup.lagging_tolerance = 1e-3;
+  setup.remesh.enabled = true;
+  const itr::Run<2> result = run(setup);
+  EXPECT_LT(result.nearest, 1e-3) << "it is expected to touch";
+  EXPECT_FALSE(result.state.mesh.has_nodes());
+}
+
 /// A clamped column of square section, pushed beyond its buckling load in one static solve: two ways to bend whose
 /// eigenvalues nearly agree.
 TEST(Stability, NoSolverLeavesASquareColumnStraight) {

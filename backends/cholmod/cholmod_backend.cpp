@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// CHOLMOD as a loadable module: supernodal and simplicial Cholesky of the lower triangle.
+// CHOLMOD as a loadable module: supernodal and simplicial Cholesky of the lower triangle, and supernodal Cholesky by tasks.
 #include <cholmod.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <numeric>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -13,10 +14,14 @@
 #include "../common/openmp.hpp"
 #include "../common/ordering.hpp"
 #include "itr/module.h"
+#include "task_cholesky.hpp"
 
 namespace {
 
-template <int Supernodal>
+/// Numeric phase of supernodal factors.
+enum class Numeric { cholmod, tasks };
+
+template <int Supernodal, Numeric By = Numeric::cholmod>
 class Cholmod {
  public:
   Cholmod() {
@@ -89,6 +94,10 @@ class Cholmod {
     ++factorizations_;
     if (factor_ && factor_->is_super) {
       if (sources_.empty()) permute_pattern();
+      if (is_by_tasks_) {
+        const int done = tasks_.factorize(values, sources_);
+        return done < tasks_.order() ? refuse(done) : ITR_OK;
+      }
       for (size_t k = 0; k < count; ++k) permuted_values_[k] = values[sources_[k]];
       double shift[2] = {0, 0};
       cholmod_super_numeric(&permuted_, nullptr, shift, factor_, &common_);
@@ -98,14 +107,16 @@ class Cholmod {
     }
     if (common_.status == CHOLMOD_NOT_POSDEF || (factor_ && factor_->minor < factor_->n)) {
       common_.status = CHOLMOD_OK;
-      std::snprintf(text_.data(), text_.size(), "not positive definite at pivot %zu of %zu", factor_ ? factor_->minor : 0,
-                    matrix_.nrow);
-      return ITR_NOT_POSITIVE_DEFINITE;
+      return refuse(factor_ ? factor_->minor : 0);
     }
     return status();
   }
 
   int solve(const double* rhs, double* solution, int columns) {
+    if (is_by_tasks_) {
+      tasks_.solve(rhs, solution, columns, static_cast<const int*>(factor_->Perm));
+      return ITR_OK;
+    }
     cholmod_dense b{};
     b.nrow = b.d = matrix_.nrow;
     b.ncol = columns;
@@ -125,6 +136,12 @@ class Cholmod {
     result.factor_nonzeros = common_.lnz;
     result.factor_bytes = result.largest_bytes =
         factor_->is_super ? 8.0 * factor_->xsize + 4.0 * factor_->ssize : 12.0 * factor_->nzmax;
+    if (is_by_tasks_) {
+      result.largest_bytes += sizeof(double) * static_cast<double>(tasks_.work_size());
+      result.tasks_wall = tasks_.times().wall;
+      result.tasks_work = tasks_.times().work;
+      result.tasks_span = tasks_.times().span;
+    }
     result.flops = common_.fl;
     return result;
   }
@@ -134,6 +151,7 @@ class Cholmod {
   void analyze_by(int ordering) {
     cholmod_free_factor(&factor_, &common_);
     sources_.clear();
+    is_by_tasks_ = false;
     common_.method[0].ordering = ordering;
     int* const given = ordering == CHOLMOD_GIVEN ? order_.permutation() : nullptr;
     factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
@@ -162,6 +180,12 @@ class Cholmod {
       sources_[at] = p;
       permuted_rows_[at] = row;
     });
+    if constexpr (By == Numeric::tasks) {
+      const auto ints = [](const void* of, std::size_t count) { return std::span(static_cast<const int*>(of), count); };
+      const cholmod_factor& l = *factor_;
+      is_by_tasks_ = tasks_.analyze(
+          {ints(l.super, l.nsuper + 1), ints(l.pi, l.nsuper + 1), ints(l.s, l.ssize), permuted_starts_, permuted_rows_});
+    }
     permuted_ = matrix_;
     permuted_.sorted = 0;
     permuted_.p = permuted_starts_.data();
@@ -169,6 +193,10 @@ class Cholmod {
     permuted_.x = permuted_values_.data();
   }
 
+  int refuse(std::size_t pivot) {
+    std::snprintf(text_.data(), text_.size(), "not positive definite at pivot %zu of %zu", pivot, matrix_.nrow);
+    return ITR_NOT_POSITIVE_DEFINITE;
+  }
   int status() {
     std::snprintf(text_.data(), text_.size(), "CHOLMOD status %d", common_.status);
     if (common_.status == CHOLMOD_OUT_OF_MEMORY || common_.status == CHOLMOD_TOO_LARGE) return ITR_OUT_OF_MEMORY;
@@ -196,6 +224,8 @@ class Cholmod {
   cholmod_sparse permuted_{};                                   ///< of supernodal factors
   std::vector<int> permuted_starts_, permuted_rows_, sources_;  ///< where in `values` an entry comes from
   std::vector<double> permuted_values_;
+  itr::backends::TaskCholesky tasks_;
+  bool is_by_tasks_ = false;
   std::array<char, 96> text_{};
 };
 
@@ -211,13 +241,16 @@ const char* version() {
 
 extern "C" __attribute__((visibility("default"))) const itr_module* itr_backend_module(void) {
   using Choice = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_AUTO>>;
+  using Tasks = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL, Numeric::tasks>>;
   using Supernodal = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SUPERNODAL>>;
   using Simplicial = itr::linear::ModuleAdapter<Cholmod<CHOLMOD_SIMPLICIAL>>;
+  constexpr uint32_t kCapabilities = ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS;
   constexpr const char* kOptions = "ordering=auto|amd|metis|natural";
   static const itr_engine engines[] = {
-      Choice::row("cholmod", version(), "GPL-2.0+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions),
-      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions),
-      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", ITR_KEEPS_ORDER | ITR_TELLS_DEFINITENESS, kOptions)};
+      Choice::row("cholmod", version(), "GPL-2.0+", kCapabilities, kOptions),
+      Tasks::row("cholmod:tasks", version(), "GPL-2.0+", kCapabilities | ITR_THREADS, kOptions),
+      Supernodal::row("cholmod:supernodal", version(), "GPL-2.0+", kCapabilities, kOptions),
+      Simplicial::row("cholmod:simplicial", version(), "LGPL-2.1+", kCapabilities, kOptions)};
   static const itr_module module{ITR_BACKEND_ABI_VERSION, sizeof engines / sizeof engines[0], engines};
   return &module;
 }

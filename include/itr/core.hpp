@@ -103,7 +103,8 @@ class ITR_EXPORT Units {
   bool is_si_ = true;
 };
 
-/// Limits the number of threads of all parallel loops run while it lives (0 = as many as there are cores).
+/// Limits the number of threads of all parallel loops run while it lives (0: as many as there
+/// are cores that this process may use, by its affinity and by the quota of its control group).
 class ITR_EXPORT ThreadLimit {
  public:
   explicit ThreadLimit(int threads);

@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-#define ITR_BACKEND_ABI_VERSION 4
+#define ITR_BACKEND_ABI_VERSION 5
 #define ITR_BACKEND_ENTRY "itr_backend_module"
 
 /* Names as in C. NOLINTBEGIN(readability-identifier-naming) */
@@ -57,6 +57,9 @@ typedef struct itr_statistics {
   double flops;           /* of the factorisation */
   double iterations;      /* of the last solve */
   double negative_pivots; /* of the last factorisation L D L^T: as many as negative eigenvalues */
+  /* Of the last factorisation or solve [s], where it was done by tasks on the threads of TBB: by the clock, sum of all
+   * tasks, and longest chain of tasks that wait for each other. */
+  double tasks_wall, tasks_work, tasks_span;
 } itr_statistics;
 
 typedef struct itr_engine {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/process.hpp"
 #include "core/profile.hpp"
 
 #ifdef __SANITIZE_THREAD__
@@ -41,9 +42,9 @@ struct ThreadLimit::Impl {
   tbb::global_control control;
 };
 
-ThreadLimit::ThreadLimit(int threads) {
-  if (threads > 0) impl_.reset(new Impl{tbb::global_control(tbb::global_control::max_allowed_parallelism, threads)});
-}
+ThreadLimit::ThreadLimit(int threads)
+    : impl_(new Impl{{tbb::global_control::max_allowed_parallelism,
+                      static_cast<std::size_t>(threads > 0 ? threads : available_cores())}}) {}
 ThreadLimit::~ThreadLimit() = default;
 
 int num_threads() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/parallel.hpp"
+#include "core/profile.hpp"
 
 namespace itr {
 
@@ -26,7 +27,7 @@ double parallel_min(std::size_t n, std::size_t block, const Body& body) {
 /// Computes make(i) for i < n on all threads, and calls use(i, value) with each in ascending order on this one.
 template <typename T, typename Make, typename Use>
 void parallel_then_ordered(std::size_t n, std::size_t block, const Make& make, const Use& use) {
-  if (num_threads() == 1 || n <= block) {
+  if (n <= block || (num_threads() == 1 && !Profile::active())) {  // a profile times the blocks that threads would take
     for (std::size_t i = 0; i < n; ++i) use(i, make(i));
     return;
   }

@@ -52,14 +52,28 @@ void Profile::leave() {
 std::vector<PhaseTimes> Profile::take() {
   charge();
   std::vector<PhaseTimes> result;
-  for (Entry& entry : entries_) {
+  PhaseTimes others;
+  std::vector<std::size_t> beside;
+  for (Entry& of_phase : entries_) {
+    const Entry entry = std::exchange(of_phase, {of_phase.kind, of_phase.term});
+    if (!(entry.wall > 0)) continue;
     const double serial = std::max(0.0, entry.wall - entry.in_loops);
     PhaseTimes times{std::string(entry.kind), entry.wall, entry.processor, serial + entry.work, serial + entry.span};
     if (!entry.term.empty()) times.name += " of " + std::string(entry.term);
     for (std::size_t i = 0; i < kPredictedCores.size(); ++i) times.predicted[i] = serial + entry.predicted[i];
     times.bytes = entry.bytes;
-    if (entry.wall > 0) result.push_back(std::move(times));
-    entry = {entry.kind, entry.term};
+    if (entry.is_beside) {
+      beside.push_back(result.size());
+    } else {
+      others.span += times.span;
+      for (std::size_t i = 0; i < kPredictedCores.size(); ++i) others.predicted[i] += times.predicted[i];
+    }
+    result.push_back(std::move(times));
+  }
+  for (const std::size_t k : beside) {
+    result[k].span = std::max(0.0, result[k].span - others.span);
+    for (std::size_t i = 0; i < kPredictedCores.size(); ++i)
+      result[k].predicted[i] = std::max(0.0, result[k].predicted[i] - others.predicted[i]);
   }
   return result;
 }
@@ -70,13 +84,8 @@ LoopTimer::LoopTimer() : profile_(active_profile) {
 
 LoopTimer::~LoopTimer() {
   if (!profile_) return;
-  const double work = 1e-9 * static_cast<double>(work_), longest = 1e-9 * static_cast<double>(longest_);
-  Profile::Entry& entry = profile_->present();
-  entry.in_loops += seconds_now() - begin_;
-  entry.work += work;
-  entry.span += longest;
-  for (std::size_t i = 0; i < kPredictedCores.size(); ++i)
-    entry.predicted[i] += std::max(longest, work / kPredictedCores[i]);
+  const Profile::Active again(profile_);
+  add_loop(seconds_now() - begin_, 1e-9 * static_cast<double>(work_), 1e-9 * static_cast<double>(longest_));
 }
 
 void LoopTimer::add(double seconds) {
@@ -85,6 +94,15 @@ void LoopTimer::add(double seconds) {
   std::int64_t longest = longest_;
   while (longest < nanoseconds && !longest_.compare_exchange_weak(longest, nanoseconds)) {
   }
+}
+
+void add_loop(double wall, double work, double span) {
+  if (!active_profile) return;
+  Profile::Entry& entry = active_profile->present();
+  entry.in_loops += wall;
+  entry.work += work;
+  entry.span += span;
+  for (std::size_t i = 0; i < kPredictedCores.size(); ++i) entry.predicted[i] += std::max(span, work / kPredictedCores[i]);
 }
 
 void add_bytes(double bytes) {

@@ -49,11 +49,13 @@ class Profile {
  private:
   friend class ScopedPhase;
   friend class LoopTimer;
+  friend void add_loop(double wall, double work, double span);
   friend void add_bytes(double bytes);
   struct Entry {
     std::string_view kind, term;
     double wall = 0, processor = 0, in_loops = 0, work = 0, span = 0, bytes = 0;
     std::array<double, kPredictedCores.size()> predicted{};
+    bool is_beside = false;
   };
   struct Level {
     std::size_t entry;
@@ -77,6 +79,8 @@ class ScopedPhase {
   explicit ScopedPhase(std::string_view kind, std::string_view term = {}) : ScopedPhase(kind, term, false) {}
   /// A phase that takes in those inside it, but for other coarse ones.
   static ScopedPhase coarse(std::string_view kind) { return ScopedPhase(kind, {}, true); }
+  /// A coarse phase that with several cores runs beside the others, and takes only what it is longer than they are.
+  static ScopedPhase beside(std::string_view kind) { return ScopedPhase(kind, {}, true, true); }
   ~ScopedPhase() {
     if (profile_) profile_->leave();
   }
@@ -84,8 +88,11 @@ class ScopedPhase {
   ScopedPhase& operator=(const ScopedPhase&) = delete;
 
  private:
-  ScopedPhase(std::string_view kind, std::string_view term, bool is_coarse) : profile_(Profile::active()) {
-    if (profile_) profile_->enter(kind, term, is_coarse);
+  ScopedPhase(std::string_view kind, std::string_view term, bool is_coarse, bool is_beside = false)
+      : profile_(Profile::active()) {
+    if (!profile_) return;
+    profile_->enter(kind, term, is_coarse);
+    if (is_beside) profile_->present().is_beside = true;
   }
 
   Profile* profile_;
@@ -115,6 +122,10 @@ class LoopTimer {
   double begin_ = 0;
   std::atomic<std::int64_t> work_ = 0, longest_ = 0;  ///< [ns]
 };
+
+/// Counts a part of the present phase that several threads share: its seconds by the clock, of all its pieces, and of the
+/// longest chain of pieces.
+void add_loop(double wall, double work, double span);
 
 /// Counts bytes that the present phase reads or writes.
 void add_bytes(double bytes);

@@ -10,6 +10,7 @@
 #include "itr/core.hpp"
 #include "itr/itr.h"
 #include "itr/itr.hpp"
+#include "simulation/report_fields.hpp"
 
 struct itr_model {
   itr::Model model;
@@ -356,11 +357,12 @@ itr_status itr_resultant_of_id(itr_simulation* simulation, int id, const double*
   });
 }
 
+static_assert(sizeof(itr_energies) == std::tuple_size_v<decltype(itr::kEnergyFields)> * sizeof(double));
 itr_status itr_get_energies(itr_simulation* simulation, itr_energies* energies) {
   return with(simulation, [&](itr::AnySimulation& s) {
     require(energies, "energies");
-    const itr::EnergyReport& e = s.report().energy;
-    *energies = {e.inertia, e.elastic, e.body, e.contact, e.friction, e.damping, e.host, e.total};
+    double* next = &energies->inertia;  // members in the order of the table
+    itr::for_each_field(itr::kEnergyFields, [&](const auto& field) { *next++ = s.report().energy.*field.member; });
   });
 }
 itr_status itr_get_statistics(itr_simulation* simulation, itr_step_statistics* statistics) {

@@ -114,6 +114,7 @@ double EnergySum::max_step(ConstVectorView x, ConstVectorView dx, Workspace& wor
 }
 
 bool EnergySum::get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const {
+  const ScopedPhase phase("ccd");
   bool has_told = false;
   for (const auto& term : terms_) {
     VectorView own = has_told ? workspace.get<SecondSteps>().steps.resize(dx.size()) : steps;
@@ -127,6 +128,7 @@ bool EnergySum::get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorVi
 
 bool EnergySum::find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                               Workspace& workspace) const {
+  const ScopedPhase phase("ccd");
   return std::any_of(terms_.begin(), terms_.end(),
                      [&](const auto& term) { return term->find_blocking(x, dx, fraction, blocking, workspace); });
 }

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/connected_parts.hpp"
 #include "mass_block.hpp"
-#include "mesh/connected_parts.hpp"
 
 namespace itr {
 

@@ -4,9 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "core/connected_parts.hpp"
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
 
@@ -73,20 +73,13 @@ std::vector<int> open_vertices(std::span<const std::array<int, 3>> facets) {
 template <int Dim>
 ClosedSurface<Dim>::ClosedSurface(std::vector<Vec<Dim>> x, std::span<const Facet> facets)
     : x_(std::move(x)), part_(x_.size(), kNone) {
-  std::vector<int> parent(x_.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const Facet& f : facets)
-    for (const int v : f) parent[root(v)] = root(f[0]);
+  const std::vector<int> connected = connected_parts<Dim>(x_.size(), facets);
   std::vector<char> is_open(x_.size(), 0);
-  for (const int v : open_vertices(facets)) is_open[root(v)] = 1;
+  for (const int v : open_vertices(facets)) is_open[connected[v]] = 1;
   std::vector<int> number(x_.size(), kNone);
   std::vector<Box<Dim>> boxes;
   for (const Facet& f : facets) {
-    const int r = root(f[0]);
+    const int r = connected[f[0]];
     if (is_open[r]) continue;
     if (number[r] == kNone) {
       number[r] = static_cast<int>(first_.size());

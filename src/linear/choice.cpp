@@ -18,16 +18,19 @@ namespace {
 
 // Where one solver overtakes another, from verification/solvers/results.csv.
 constexpr int kDenseBelow = 60;
+constexpr const char* kTasks = "cholmod:tasks";
+constexpr double kContributions = 0.7;  ///< memory beside the factor that cholmod:tasks takes, over the factor
 constexpr std::size_t kSupernodalAbove2d = 60'000, kSupernodalAbove3d = 20'000;  // nonzeros of the lower triangle
 
 double half_of_memory() {
   return 0.5 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-bool outgrows_memory(const MatrixTraits& traits) {
+/// Whether factors and what is needed beside them, over the factors, do not fit.
+bool outgrows_memory(const MatrixTraits& traits, double beside = 0) {
   const double memory = traits.memory_bytes > 0 ? traits.memory_bytes : half_of_memory();
   return !traits.may_be_indefinite &&
-         (traits.factor_bytes > 0 ? traits.factor_bytes : estimate_factor_bytes(traits)) > memory;
+         (1 + beside) * (traits.factor_bytes > 0 ? traits.factor_bytes : estimate_factor_bytes(traits)) > memory;
 }
 
 /// Stands for a solver that could not be created in the middle of a run.
@@ -71,8 +74,8 @@ class AutoSolver final : public Forwarding {
   Outcome analyze(const SparsityPattern& pattern, const AnalyzeHints& hints) override {
     MatrixTraits traits{pattern.order, pattern.nonzeros(), hints.block_size, may_be_indefinite_};
     if (!hints.may_keep_order) factor_bytes_ = 0;
-    if (factor_bytes_ == 0 && outgrows_memory(traits) && registry_.is_ready("cholmod")) {
-      solver_ = registry_.create("cholmod", options_["cholmod"]);  // where it is picked, the next analysis is for nothing
+    if (factor_bytes_ == 0 && outgrows_memory(traits, kContributions) && registry_.is_ready(kTasks)) {
+      solver_ = create(kTasks);  // where it is picked, the next analysis is for nothing
       const bool is_possible = solver_->analyze(pattern, hints) == Outcome::ok;
       factor_bytes_ =
           is_possible ? sizeof(double) * solver_->statistics().factor_nonzeros : std::numeric_limits<double>::infinity();
@@ -89,11 +92,14 @@ class AutoSolver final : public Forwarding {
  private:
   const Solver& current() const override { return *solver_; }
 
+  /// With its options; cholmod:tasks has those of cholmod where it has none of its own.
+  std::unique_ptr<Solver> create(const std::string& name) {
+    return registry_.create(name, options_[name == kTasks && !options_.contains(kTasks) ? "cholmod" : name]);
+  }
   void pick(const MatrixTraits& traits) {
     Pick picked = pick_solver(traits, registry_);
     if (!solver_ || picked.name != solver_->name())
-      solver_ =
-          created_or_absent(picked.name, [&](const std::string& name) { return registry_.create(name, options_[name]); });
+      solver_ = created_or_absent(picked.name, [&](const std::string& name) { return create(name); });
     if (traits.order > 0 && std::exchange(told_, picked.name) != picked.name)
       logger_.info("linear solver: auto takes " + picked.name + " for " + std::to_string(traits.order) +
                    " unknowns: " + picked.reason);
@@ -232,6 +238,8 @@ Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char
       if (is_there(name)) return {name, "large, and it may be indefinite"};
     return {"eigen:ldlt", "it may be indefinite, and neither mumps nor umfpack is there"};
   }
+  if (!outgrows_memory(traits, kContributions) && is_there(kTasks))
+    return {kTasks, "large: dense blocks of the factor pay, on all threads"};
   for (const char* name : {"cholmod", "mumps:spd"})
     if (is_there(name)) return {name, "large: dense blocks of the factor pay"};
   return {"eigen:ldlt", "neither cholmod nor mumps is there"};

@@ -19,10 +19,6 @@ struct SystemView {
   std::span<const double> values, b;
 };
 
-constexpr int kTellsRate = 6;       ///< iterations after which their rate is known roughly, to a factor of two
-constexpr double kCertain = 1e-12;  ///< negative curvature, relative, that is no round-off
-constexpr double kNoise = 1e-2;     ///< of the right-hand side: what iterations start from in every direction
-
 inline double dot(std::span<const double> a, std::span<const double> b) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
@@ -83,6 +79,10 @@ class ConjugateGradients {
   int iterations() const { return iterations_; }  ///< of the last run
 
  private:
+  static constexpr int kTellsRate = 6;       ///< iterations after which their rate is known roughly, to a factor of two
+  static constexpr double kCertain = 1e-12;  ///< negative curvature, relative, that is no round-off
+  static constexpr double kNoise = 1e-2;     ///< of the right-hand side: what iterations start from in every direction
+
   End iterate(const SystemView& system, const Preconditioner& precondition, double target, int most) {
     const std::size_t n = r_.size();
     const double first = norm(r_);

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "blas_kernels.hpp"
+#include "core/profile.hpp"
 #include "itr/solver.hpp"
 
 /// The folder of the prefix that a program was linked against: the installed package compiles it into the program.
@@ -37,10 +38,16 @@ class ModuleEngine final : public Engine {
     return outcome(table_.analyze(self_, &view, &help));
   }
   Outcome factorize(std::span<const double> values) override {
-    return self_ ? outcome(table_.factorize(self_, values.data(), values.size())) : Outcome::out_of_memory;
+    if (!self_) return Outcome::out_of_memory;
+    const Outcome result = outcome(table_.factorize(self_, values.data(), values.size()));
+    tell_profile();
+    return result;
   }
   Outcome solve(std::span<const double> B, std::span<double> X, int columns) override {
-    return self_ ? outcome(table_.solve(self_, B.data(), X.data(), columns)) : Outcome::out_of_memory;
+    if (!self_) return Outcome::out_of_memory;
+    const Outcome result = outcome(table_.solve(self_, B.data(), X.data(), columns));
+    tell_profile();
+    return result;
   }
   Statistics statistics() const override {
     itr_statistics s{};
@@ -55,6 +62,13 @@ class ModuleEngine final : public Engine {
   std::string message() const override { return self_ ? table_.message(self_) : "no memory for the solver"; }
 
  private:
+  /// Seconds of the tasks of the last call: what more cores would take of it.
+  void tell_profile() const {
+    if (!Profile::active()) return;
+    itr_statistics s{};
+    table_.statistics(self_, &s);
+    add_loop(s.tasks_wall, s.tasks_work, s.tasks_span);
+  }
   static Outcome outcome(int32_t code) {
     return code >= ITR_OK && code <= ITR_FAILED ? static_cast<Outcome>(code) : Outcome::failed;
   }

@@ -44,6 +44,7 @@ struct Known {
 };
 constexpr Known kKnown[] = {
     {"cholmod", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
+    {"cholmod:tasks", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"cholmod:supernodal", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"cholmod:simplicial", "itr_backend_cholmod", "libsuitesparse-dev libopenblas-dev"},
     {"umfpack", "itr_backend_umfpack", "libsuitesparse-dev libopenblas-dev"},

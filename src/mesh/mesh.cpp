@@ -9,9 +9,9 @@
 #include <string>
 
 #include "core/check.hpp"
+#include "core/connected_parts.hpp"
 #include "geometry/measures.hpp"
 #include "itr/core.hpp"
-#include "mesh/connected_parts.hpp"
 
 namespace itr {
 

@@ -9,15 +9,6 @@
 
 namespace itr {
 
-constexpr double kNothing = 1e-10;     ///< see NewtonExtras::step_to_start
-constexpr double kVanishing = 1e-140;  ///< squares of smaller numbers are no numbers any more
-constexpr double kFloor = 8;           ///< times the round-off of the gradient: no step can be told to improve it
-constexpr double kFarAbove = 1e4;      ///< the same: a larger residual is an error, not round-off
-constexpr int kMostUnresolved = 20;    ///< steps in a row below the resolution of the energy
-constexpr int kMostStill = 4;          ///< of these, steps in a row after which the gradient had not shrunk
-constexpr double kShrunk = 0.9;        ///< fraction of the gradient that had shrunk last
-constexpr double kNear = 10;           ///< times a tolerance
-
 /// The tests by which a solve ends. None holds before held dofs are at their targets.
 class Convergence {
  public:
@@ -84,6 +75,15 @@ class Convergence {
   }
 
  private:
+  static constexpr double kNothing = 1e-10;     ///< see NewtonExtras::step_to_start
+  static constexpr double kVanishing = 1e-140;  ///< squares of smaller numbers are no numbers any more
+  static constexpr double kFloor = 8;           ///< times the round-off of the gradient: no step can be told to improve it
+  static constexpr double kFarAbove = 1e4;      ///< the same: a larger residual is an error, not round-off
+  static constexpr int kMostUnresolved = 20;    ///< steps in a row below the resolution of the energy
+  static constexpr int kMostStill = 4;          ///< of these, steps in a row after which the gradient had not shrunk
+  static constexpr double kShrunk = 0.9;        ///< fraction of the gradient that had shrunk last
+  static constexpr double kNear = 10;           ///< times a tolerance
+
   /// The forces that act are the measure, unless the options give another one for gradients.
   double force_asked() const {
     const NewtonOptions& options = task_.options;

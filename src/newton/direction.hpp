@@ -10,14 +10,6 @@
 
 namespace itr {
 
-constexpr double kLoosest = 1e-4;         ///< residual of a direction
-constexpr int kMostLoose = 8;             ///< iterations of a solve that may be loose
-constexpr double kFirstFraction = 1e-13;  ///< of each diagonal entry
-constexpr int kMostFractions = 12;        ///< each ten times the one before
-constexpr double kFirstShift = 1e-10;     ///< of the largest: where an entry is 0 or below
-constexpr int kMostShifts = 12;
-constexpr double kMostOfShift = 0.1;  ///< of the curvature along a step that may be the last
-
 /// Whether a shift of the Hessian may help.
 inline bool is_curable(linear::Outcome outcome) {
   return outcome != linear::Outcome::non_finite && outcome != linear::Outcome::out_of_memory &&
@@ -103,6 +95,14 @@ class Direction {
   const std::string& failure() const { return failure_; }
 
  private:
+  static constexpr double kLoosest = 1e-4;         ///< residual of a direction
+  static constexpr int kMostLoose = 8;             ///< iterations of a solve that may be loose
+  static constexpr double kFirstFraction = 1e-13;  ///< of each diagonal entry
+  static constexpr int kMostFractions = 12;        ///< each ten times the one before
+  static constexpr double kFirstShift = 1e-10;     ///< of the largest: where an entry is 0 or below
+  static constexpr int kMostShifts = 12;
+  static constexpr double kMostOfShift = 0.1;  ///< of the curvature along a step that may be the last
+
   struct Scratch {
     ScratchVector step, rhs, solution;
   };

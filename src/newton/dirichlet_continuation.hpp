@@ -12,11 +12,6 @@
 
 namespace itr {
 
-constexpr int kMaxBlocked = 50;
-constexpr double kLeastProgress = 0.99;  ///< in so many iterations: the fraction of the way that is left at most
-constexpr double kNoProgress = 1e-6;     ///< fraction of a step that brings held dofs no nearer
-constexpr double kLeastPenalty = 1e-8;   ///< force by length and stiffness: above the round-off of a body at rest
-
 /// The motion of held dofs to their targets. In each iteration they advance as far as bodies let them, or stay so that the
 /// bodies can give way; an exact penalty of the way left makes that a descent (Nocedal & Wright 2006, §18.3).
 class DirichletContinuation {
@@ -90,6 +85,11 @@ class DirichletContinuation {
   }
 
  private:
+  static constexpr int kMaxBlocked = 50;
+  static constexpr double kLeastProgress = 0.99;  ///< in so many iterations: the fraction of the way that is left at most
+  static constexpr double kNoProgress = 1e-6;     ///< fraction of a step that brings held dofs no nearer
+  static constexpr double kLeastPenalty = 1e-8;   ///< force by length and stiffness: above the round-off of a body at rest
+
   struct Scratch {
     ScratchVector place;
   };

@@ -11,9 +11,6 @@
 
 namespace itr {
 
-constexpr double kResolved = 1e4;  ///< times its round-off: the change of energy that the first step exceeds
-constexpr int kMostDoublings = 12;
-
 /// NewtonSummary::message of a solve that ends at a saddle.
 inline constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
 
@@ -35,6 +32,9 @@ class Saddle {
   bool leave() { return is_here() && descend(); }
 
  private:
+  static constexpr double kResolved = 1e4;  ///< times its round-off: the change of energy that the first step exceeds
+  static constexpr int kMostDoublings = 12;
+
   struct Scratch {
     ScratchVector candidate;
   };

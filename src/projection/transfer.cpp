@@ -7,10 +7,10 @@
 #include <cmath>
 #include <vector>
 
+#include "core/connected_parts.hpp"
 #include "fem/mass.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/intersection.hpp"
-#include "mesh/connected_parts.hpp"
 
 namespace itr {
 

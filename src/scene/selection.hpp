@@ -14,8 +14,6 @@
 
 namespace itr::scene {
 
-constexpr double kNear = 1e-7;  ///< of the geometry's diagonal: how far from a side a threshold below 0 selects
-
 template <int Dim>
 class Selection {
  public:
@@ -51,6 +49,8 @@ class Selection {
   }
 
  private:
+  static constexpr double kNear = 1e-7;  ///< of the box's diagonal: how far from a side a threshold below 0 selects
+
   using Test = std::function<bool(const Vec<Dim>&)>;
   using Rule = std::function<std::optional<Label>(const Vec<Dim>&, int)>;
 

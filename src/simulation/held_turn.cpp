@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "core/connected_parts.hpp"
 #include "geometry/rotation.hpp"
-#include "mesh/connected_parts.hpp"
 
 namespace itr {
 

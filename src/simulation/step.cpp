@@ -313,21 +313,16 @@ class StepSolver {
     NewtonSummary summary = solve(expected);
     for (int solves = 1; summary.converged(); ++solves) {
       const ChordDemand demand = find_chord_demand(setup_, next_.mesh, next_.chords, x_);
-      if (demand.excess <= 1) return summary;
-      if (demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start)) {
-        warn(
-            fmt::format("curved edges leave the chords that contact acts on by {:.2g} times of what they may (a quarter of "
-                        "d-hat, half of the gap) and can have no shorter chords: a finer mesh helps",
-                        demand.excess));
-        return summary;
-      }
+      if (demand.excess <= 1 || demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start))
+        return summary;  // Watch tells of what is left
       ChordLevels fewer = std::exchange(next_.chords, demand.levels);
       VectorX solution = std::exchange(x_, start);  // where the next solve begins, if the way there is free
       auto problem_before = std::move(problem_);
       make_problem();
       NewtonSummary with_more = solve(solution);
       if (!with_more.converged() && with_more.termination != Termination::cancelled) {
-        warn("keeping the chords of curved edges as they were, the step with more of them failed: " + reason_of(with_more));
+        tools_.logger.info(fmt::format("step {}: keeping the chords of curved edges, the step with more of them failed: {}",
+                                       next_.step, reason_of(with_more)));
         next_.chords = std::move(fewer);
         x_ = std::move(solution);
         problem_ = std::move(problem_before);

@@ -156,6 +156,7 @@ VectorX StepProblem<Dim>::increment_of(const VectorX& x) const {
 
 template <int Dim>
 VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
+  smooth_friction_by(relative_motion<Dim>(increment_of(x)));
   lagged_ = potential_.lag(x, workspace_);
   EnergySum sum = potential_.sum(lagged_);
   if (least_motion_) sum.add(least_motion_);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Costs of one solver on one dumped system (itr_dump_systems):
-//   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...
+//   [mpirun -n N] itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [--threads N] [KEY=VALUE]...
 // Prints one line of JSON: seconds of the analysis, of a factorisation and a solve (medians), of both through the engine
 // alone where it is a module, what checks, residuals and refinement add to that (the median of the ratios of runs that
 // follow each other, less one), fill, bytes, achieved residual. --once: one factorisation and no bare engine. --analyze: the
 // analysis alone, and the fill, bytes and flops that it predicts. --after: the analysis may keep the order of that of
-// another system, which comes first.
+// another system, which comes first. --threads: those that a solver by tasks takes. factorise_work_s, factorise_span_s and
+// those of the solve are what one core and any number of cores would take, by the times of tasks.
 #include <dlfcn.h>
 #include <fmt/format.h>
 
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "apps/itr/ranks.hpp"
+#include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "dump.hpp"
 #include "itr/core.hpp"
@@ -75,8 +77,10 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
   const auto solver = registry.create(name, options);
   Outcome outcome = Outcome::ok;
   double residual = 1;
+  Profile profile;
   const auto keep_worst = [&](Outcome next) { outcome = outcome == Outcome::ok ? next : outcome; };
   const auto factorize_and_solve = [&] {
+    const Profile::Active active(&profile);
     return measure([&] { keep_worst(solver->factorize(system.values)); },
                    [&] {
                      const SolveReport report = solver->solve(system.rhs, x, 1, kAskedResidual);
@@ -108,16 +112,21 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
   }
   const Times own = median(checked), library = median(bare);
   const Statistics statistics = solver->statistics();
+  std::string phases;
+  for (const PhaseTimes& phase : profile.take())
+    if (phase.name == "factorise" || phase.name == "solve")
+      phases += fmt::format(", \"{0}_work_s\": {1:.4g}, \"{0}_span_s\": {2:.4g}", phase.name, phase.work / checked.size(),
+                            phase.span / checked.size());
   fmt::print(
       "{{\"solver\": \"{}\", \"unknowns\": {}, \"nonzeros\": {}, \"outcome\": \"{}\", \"analyze_s\": {:.4g}, "
       "\"factorize_s\": {:.4g}, \"solve_s\": {:.4g}, \"bare_factorize_s\": {:.4g}, \"bare_solve_s\": {:.4g}, "
       "\"overhead\": {}, "
       "\"factor_nonzeros\": {:.6g}, \"factor_mb\": {:.4g}, \"largest_rank_mb\": {:.4g}, \"flops\": {:.4g}, "
-      "\"iterations\": {}, \"residual\": {}}}\n",
+      "\"iterations\": {}, \"residual\": {}{}}}\n",
       name, system.pattern.order, system.pattern.nonzeros(), to_string(outcome), analyze, own.factorize, own.solve,
       library.factorize, library.solve, overheads.empty() ? "null" : fmt::format("{:.4f}", median(overheads)),
       statistics.factor_nonzeros, statistics.factor_bytes / 1e6, statistics.largest_bytes / 1e6, statistics.flops,
-      statistics.iterations, std::isfinite(residual) ? fmt::format("{:.2e}", residual) : "null");
+      statistics.iterations, std::isfinite(residual) ? fmt::format("{:.2e}", residual) : "null", phases);
   if (outcome != Outcome::ok) fmt::print(stderr, "{}: {}\n", name, solver->message());
 }
 
@@ -125,13 +134,15 @@ void bench(Registry& registry, const DumpedSystem& system, const std::string& na
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    fmt::print(stderr, "usage: itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [KEY=VALUE]...\n");
+    fmt::print(stderr,
+               "usage: itr_solver_bench SYSTEM SOLVER [--analyze | --once] [--after OTHER] [--threads N] [KEY=VALUE]...\n");
     return 2;
   }
   try {
     SolverOptions options;
     Repeats repeats = Repeats::some;
     std::string after;
+    int threads = 0;
     for (int i = 3; i < argc; ++i) {
       const std::string text = argv[i];
       if (text == "--analyze" || text == "--once") {
@@ -142,10 +153,15 @@ int main(int argc, char** argv) {
         after = argv[++i];
         continue;
       }
+      if (text == "--threads" && i + 1 < argc) {
+        threads = std::stoi(argv[++i]);
+        continue;
+      }
       const auto equals = text.find('=');
       if (equals == std::string::npos) throw InputError({"", "option", text, "KEY=VALUE"});
       options[text.substr(0, equals)] = text.substr(equals + 1);
     }
+    const ThreadLimit limit(threads);
     Registry registry;
     registry.allow_mpi_start();
     const std::string solver = Registry::canonical_name(argv[2]);

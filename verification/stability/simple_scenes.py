@@ -506,7 +506,8 @@ def buckling(rng):
         draw.more["space"] = {"remesh": {"enabled": True}}
     solid = Solid(draw.points, draw.cells, draw.tags, {1: draw.material}, 2 if is_remeshed else draw.order)
     critical, load = critical_motion(plan, solid)
-    if critical / draw.extent[1] > 0.03:
+    # Linear buckling is the reference: at a strain of 2.8 % a column of Neo-Hooke carries 14 % more on its twice refined mesh.
+    if critical / draw.extent[1] > 0.015:
         raise Redraw
     share = float(pick(rng, [0.6, 1.6]))
     plan.scale(share * critical)

@@ -10,12 +10,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "advice.hpp"
+#include "core/connected_parts.hpp"
 #include "fem/quadrature.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
-#include "mesh/connected_parts.hpp"
 #include "mesh/rest_box.hpp"
-#include "simulation/advice.hpp"
 #include "simulation/barrier_stiffness.hpp"
 #include "simulation/named.hpp"
 #include "simulation/state.hpp"

@@ -143,18 +143,20 @@ void check_command(const CLI::App& app, int argc, char** argv) {
                     fmt::format("{}one of {}", near.empty() ? "" : near + " perhaps; ", fmt::join(names, ", "))});
 }
 
-/// Becomes the Python program of `itr study` (src/apps/study), which gets these arguments, the last of them null.
-[[noreturn]] void become_study(char** arguments) {
+/// Becomes the Python program of `itr study` or `itr sweep` (src/apps), which gets these arguments, the last of them null.
+[[noreturn]] void become_python(const std::string& name, char** arguments) {
   namespace fs = std::filesystem;
   const fs::path program = fs::canonical("/proc/self/exe");
-  std::string folder = (program.parent_path() / ITR_STUDY_FOLDER).lexically_normal().string();
+  std::string folder = (program.parent_path() / ITR_PROGRAMS_FOLDER / name).lexically_normal().string();
   if (!fs::exists(folder))
-    throw InputError({folder, "", "no such folder", "the Python program of `itr study`, installed beside the command"});
-  // Runs of a study find the program and its modules even if files are replaced while the study runs.
-  const int file = open("/proc/self/exe", O_RDONLY);
-  std::string self = file < 0 ? program.string() : fmt::format("/proc/{}/fd/{}", getpid(), file), modules;
-  for (const fs::path& one : linear::module_folders()) modules += (modules.empty() ? "" : ":") + one.string();
-  setenv("ITR_BACKEND_PATH", modules.c_str(), 1);
+    throw InputError(
+        {folder, "", "no such folder", fmt::format("the Python program of `itr {}`, installed beside the command", name)});
+  std::string self = program.string(), modules;
+  if (name == "study") {  // its runs find the program and its modules even if files are replaced while it runs
+    if (const int file = open("/proc/self/exe", O_RDONLY); file >= 0) self = fmt::format("/proc/{}/fd/{}", getpid(), file);
+    for (const fs::path& one : linear::module_folders()) modules += (modules.empty() ? "" : ":") + one.string();
+    setenv("ITR_BACKEND_PATH", modules.c_str(), 1);
+  }
 
   const char* asked = std::getenv("ITR_PYTHON");
   std::string python = asked ? asked : fs::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3", option = "-B";
@@ -162,7 +164,7 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   for (; *arguments; ++arguments) words.push_back(*arguments);
   words.push_back(nullptr);
   execvp(python.c_str(), words.data());
-  throw InputError({"", "study", "no program " + python, "Python: apt install python3 python3-matplotlib"});
+  throw InputError({"", name, "no program " + python, "Python: apt install python3 python3-matplotlib"});
 }
 
 void check_single_rank() {
@@ -214,10 +216,12 @@ int dispatch(int argc, char** argv) {
   apart->add_option("reference", reference, "result folder of the run to compare with")->required();
   apart->add_flag("--last", last_only, "at the last time that both have stored alone (default: at all of them)");
   app.add_subcommand("study", "speed against error: runs a scene on many meshes and says which to take");
+  app.add_subcommand("sweep",
+                     "runs of a scene with other values, for GNU parallel or a job array, and their results in a table");
   check_command(app, argc, argv);
-  if (argc > 1 && std::string_view(argv[1]) == "study") {
+  if (const std::string name = argc > 1 ? argv[1] : ""; name == "study" || name == "sweep") {
     check_single_rank();
-    become_study(argv + 2);
+    become_python(name, argv + 2);
   }
   try {
     app.parse(argc, argv);

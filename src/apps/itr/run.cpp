@@ -10,6 +10,7 @@
 #include <condition_variable>
 #include <csignal>
 #include <cstdio>
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,7 +19,9 @@
 #include <thread>
 #include <utility>
 
+#include "advice.hpp"
 #include "core/parallel.hpp"
+#include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "itr/core.hpp"
@@ -27,7 +30,6 @@
 #include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
-#include "simulation/advice.hpp"
 
 namespace itr::cli {
 
@@ -73,17 +75,18 @@ class Warnings {
     if (writer_)
       writer_->warn(std::string(text));
     else
-      early_.emplace_back(text);
+      kept_.emplace_back(text);
   }
-  /// Passes warnings on to the writer, also those from before it was there.
+  /// Passes warnings on to the writer, also those from before it was there; null: keeps them for the next one.
   void set_writer(output::Writer* writer) {
     writer_ = writer;
-    for (const std::string& text : early_) writer_->warn(text);
-    early_.clear();
+    if (!writer_) return;
+    for (const std::string& text : kept_) writer_->warn(text);
+    kept_.clear();
   }
 
  private:
-  std::vector<std::string> early_;
+  std::vector<std::string> kept_;
   std::map<std::string, int> said_;  ///< how often, by kind
   output::Writer* writer_ = nullptr;
 };
@@ -164,9 +167,8 @@ std::string describe_remeshing(const StepReport& totals, const Units& units, int
 /// Says what steps were chosen, and what they add to the error.
 std::string describe_steps(const StepReport& totals, const AdaptiveTimeOptions& options) {
   return fmt::format(
-      "steps for a /time/tolerance of {:g}: {} taken, {} rejected (see steps.jsonl); the estimates of their errors sum up "
-      "to "
-      "{:.2g} % of the motion in the energy norm",
+      "steps for a /time/tolerance of {:g}: {} taken, {} rejected (see steps.jsonl); "
+      "the estimates of their errors sum up to {:.2g} % of the motion in the energy norm",
       options.tolerance, totals.step, totals.rejected_steps, 100 * totals.time_error);
 }
 
@@ -260,6 +262,8 @@ class Run {
       linear::Registry& registry, Warnings& warnings, double start)
       : directory_(folder.path().string()),
         with_report_(options.report),
+        writes_beside_(threads > 1),
+        warnings_(warnings),
         simulation_(std::move(setup), registry, make_logger(warnings)) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(),
@@ -270,11 +274,13 @@ class Run {
                                further_files(simulation_.setup(), options),
                                scene.defaults.name};
     const auto saved = find_resumable(folder, options);
+    std::signal(SIGINT, on_interrupt);  // from here on files are written
+    std::signal(SIGTERM, on_termination);
     writer_ = saved
                   ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
                   : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
     if (options.profile) profile_.emplace(directory_, threads);
-    warnings.set_writer(writer_.get());
+    warnings_.set_writer(writer_.get());
     if (const int count = writer_->removed_files(); count > 0)
       spdlog::info("removed from {}: {} files of {}", directory_, count,
                    saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
@@ -286,19 +292,18 @@ class Run {
   }
 
   int run() {
-    std::signal(SIGINT, on_interrupt);
-    std::signal(SIGTERM, on_termination);
     std::string outcome, advice = "`itr run` with --resume goes on from the last saved state in " + directory_;
     std::unique_lock at_output(output_);
     const std::jthread watching([this, advice](const std::stop_token& end) { watch(end, advice); });
     try {
       outcome = advance(at_output, advice);
+      finish_frame();
       if (outcome != kFinished && !is_saved_) save();
       writer_->add_output(std::exchange(output_seconds_, 0));
       writer_->finish(outcome, simulation_.solver_name_in_use());
     } catch (const InputError& error) {  // of the output: what is on the disk stays as it is
       const std::string of_output =
-          fmt::format("step {}, whose files could not all be written: {}", simulation_.steps(), error.what());
+          fmt::format("step {}, whose files could not all be written: {}", frame_step_, error.what());
       outcome = outcome.empty() || outcome == kFinished ? "stopped at " + of_output : outcome + "; and at " + of_output;
     }
     if (isatty(STDOUT_FILENO)) fmt::print("\n");
@@ -372,6 +377,7 @@ class Run {
   [[noreturn]] void drop_step(const std::string& advice) {
     std::string outcome = fmt::format("interrupted in step {}, which is dropped", before_.state->step + 1);
     try {
+      finish_frame();
       if (!is_saved_)
         simulation_.observe(before_, [&](const FrameView<Dim>& frame) { writer_->save(frame, *before_.state); });
       writer_->add_output(std::exchange(output_seconds_, 0));
@@ -432,15 +438,34 @@ class Run {
     }
   }
 
+  /// Writes the step's files; with several threads beside the next step, so that two frames at most are in memory. Throws
+  /// InputError where those of the step before could not be written.
   void write(StepReport report) {
+    const auto phase = ScopedPhase::beside("output");
+    finish_frame();
     report.seconds.output = output_seconds_;  // of the frame before: this one is not written yet
     report.seconds.total += output_seconds_;
     output_seconds_ = 0;
     const ScopedTimer timer(output_seconds_);
-    const auto phase = ScopedPhase::coarse("output");
-    const State<Dim>& state = simulation_.state();
+    frame_step_ = report.step;
     is_saved_ = simulation_.finished() || interrupted || writer_->is_checkpoint_due(simulation_.steps(), simulation_.time());
-    simulation_.observe([&](const FrameView<Dim>& frame) { writer_->write(frame, report, is_saved_ ? &state : nullptr); });
+    const auto store = [this, report, snapshot = simulation_.save(), is_saved = is_saved_] {
+      simulation_.observe(snapshot, [&](const FrameView<Dim>& frame) {
+        writer_->write(frame, report, is_saved ? snapshot.state.get() : nullptr);
+      });
+    };
+    if (!writes_beside_) return store();
+    warnings_.set_writer(nullptr);
+    frame_ = std::async(std::launch::async, store);
+  }
+
+  /// Waits for the frame that is being written. Throws InputError where it could not be.
+  void finish_frame() {
+    if (!frame_.valid()) return;
+    const ScopedTimer timer(output_seconds_);
+    frame_.wait();
+    warnings_.set_writer(writer_.get());
+    frame_.get();
   }
 
   void save() {
@@ -448,16 +473,19 @@ class Run {
   }
 
   std::string directory_;
-  bool with_report_;
+  bool with_report_, writes_beside_;
+  Warnings& warnings_;
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
   std::optional<output::ProfileFile> profile_;
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;
-  bool is_saved_ = false;  ///< whether the present state is
-  std::mutex output_;      ///< of the writer and of what is below
-  Snapshot<Dim> before_;   ///< the state that the step begins with
+  bool is_saved_ = false;    ///< whether the present state is
+  std::mutex output_;        ///< of the writer and of what is below
+  Snapshot<Dim> before_;     ///< the state that the step begins with
+  int frame_step_ = 0;       ///< of the frame that was written last, or is being written
+  std::future<void> frame_;  ///< being written
 };
 
 /// Reads the scene anew where it asks for no defaults, with those that the run it goes on with had.
@@ -485,6 +513,11 @@ int run(const RunOptions& options) {
   if (!scene.defaults.information.empty()) spdlog::info("{}", scene.defaults.information);
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
   const ThreadLimit limit(threads);
+  if (const int ranks = this_launch().ranks, cores = available_cores();
+      ranks > 1 && ranks - 1 + threads > cores && threads > 0)
+    warnings.add(
+        fmt::format("{} ranks, of which the first has {} threads, on {} cores: they wait for each other (--threads)", ranks,
+                    threads, cores));
   linear::Registry registry;
   registry.allow_mpi_start();
   return std::visit(

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/connected_parts.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/distance.hpp"
-#include "mesh/connected_parts.hpp"
 
 namespace itr::report {
 

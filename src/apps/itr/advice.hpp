@@ -7,7 +7,7 @@
 
 #include "simulation/state.hpp"
 
-namespace itr {
+namespace itr::cli {
 
 /// Units that are unusual, bad meshes, bodies that nothing holds, surfaces that push each other from the start: a sentence
 /// each.
@@ -18,4 +18,4 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation);
 template <int Dim>
 std::vector<std::string> foretell(const Setup<Dim>& setup);
 
-}  // namespace itr
+}  // namespace itr::cli

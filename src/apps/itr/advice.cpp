@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "simulation/advice.hpp"
+#include "advice.hpp"
 
 #include <fmt/format.h>
 
@@ -13,20 +13,20 @@
 #include <set>
 #include <utility>
 
-#include "barrier_stiffness.hpp"
+#include "core/connected_parts.hpp"
 #include "geometry/measures.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
-#include "mesh/connected_parts.hpp"
+#include "long_steps.hpp"
+#include "resolution.hpp"
+#include "simulation/barrier_stiffness.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/named.hpp"
-#include "simulation/resolution.hpp"
-#include "simulation/step_length.hpp"
+#include "simulation/sizes.hpp"
 #include "simulation/step_problem.hpp"
 #include "simulation/step_terms.hpp"
-#include "sizes.hpp"
 
-namespace itr {
+namespace itr::cli {
 
 namespace {
 
@@ -518,4 +518,4 @@ template std::vector<std::string> find_suspicious(const Simulation<3>&);
 template std::vector<std::string> foretell(const Setup<2>&);
 template std::vector<std::string> foretell(const Setup<3>&);
 
-}  // namespace itr
+}  // namespace itr::cli

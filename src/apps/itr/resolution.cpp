@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "simulation/resolution.hpp"
+#include "resolution.hpp"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "sizes.hpp"
+#include "simulation/sizes.hpp"
 
-namespace itr {
+namespace itr::cli {
 
 namespace {
 
@@ -111,4 +111,4 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
 template void find_unresolved(const Simulation<2>&, std::vector<std::string>&);
 template void find_unresolved(const Simulation<3>&, std::vector<std::string>&);
 
-}  // namespace itr
+}  // namespace itr::cli
