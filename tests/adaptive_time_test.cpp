@@ -56,7 +56,7 @@ Outcome run(Setup<2> setup) {
 TEST(AdaptiveTime, ErrorFollowsTheToleranceAndTheEstimate) {
   constexpr double kEnd = 0.1;  // about two periods of the slowest swing
   auto reference = swinging_square();
-  reference.time = {.integrator = Integrator::bdf, .dt = kEnd / 8000, .steps = 8000};
+  reference.time = {.integrator = Integrator::bdf, .dt = kEnd / 2000, .steps = 2000};
   const Outcome exact = run(reference);
   const double amplitude = (exact.x - run([] {
                                         auto setup = swinging_square();
@@ -65,19 +65,17 @@ TEST(AdaptiveTime, ErrorFollowsTheToleranceAndTheEstimate) {
                                       }())
                                           .x)
                                .norm();
-  double before = 0;
+  std::vector<double> errors;
   for (const double tolerance : {0.08, 0.02, 0.005}) {
     auto setup = swinging_square();
     make_adaptive(setup, Integrator::bdf, tolerance, kEnd);
     const Outcome adaptive = run(setup);
-    const double error = (adaptive.x - exact.x).norm() / amplitude;
+    errors.push_back((adaptive.x - exact.x).norm() / amplitude);
     EXPECT_EQ(adaptive.times.back(), kEnd);
-    EXPECT_LT(error, 3 * adaptive.error) << "at " << tolerance << " by " << adaptive.steps << " steps";
-    if (before > 0) {
-      EXPECT_GT(before / error, 2) << "at " << tolerance;
-    }
-    before = error;
+    EXPECT_LT(errors.back(), adaptive.error) << "at " << tolerance << " by " << adaptive.steps << " steps";
+    EXPECT_GT(errors.back(), adaptive.error / 10) << "at " << tolerance << " by " << adaptive.steps << " steps";
   }
+  EXPECT_GT(errors[0] / errors[2], 6);
 }
 
 /// A program's steps have the lengths that it asks for.
@@ -103,14 +101,14 @@ TEST(AdaptiveTime, LeavesAProgramItsSteps) {
 TEST(AdaptiveTime, StepsAfterRestoreHaveTheSameBits) {
   auto setup = impact();
   setup.contact.friction_coefficient = 0;
-  make_adaptive(setup, Integrator::bdf, 0.1, 0.04);
+  make_adaptive(setup, Integrator::bdf, 0.2, 0.012);
   enable_remeshing(setup);
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
   Snapshot<2> saved;
   std::vector<StepReport> first;
   while (!simulation.finished()) {
-    if (simulation.steps() == 12) saved = simulation.save();
+    if (simulation.steps() == 8) saved = simulation.save();
     const StepResult result = simulation.advance();
     ASSERT_TRUE(result.ok) << result.reason;
     expect_valid(simulation);
@@ -177,14 +175,14 @@ double energy_after_bounce(double gap, double tolerance) {
 
 TEST(AdaptiveTime, AnImpactKeepsItsEnergyWhereverItFallsInAStep) {
   double least = 2, most = 0;
-  for (int i = 0; i < 6; ++i) {
-    const double kept = energy_after_bounce(0.005 * (1 + i / 6.0), 0.02);
+  for (int i = 0; i < 8; ++i) {
+    const double kept = energy_after_bounce(0.005 * (1 + i / 8.0), 0.01);
     least = std::min(least, kept);
     most = std::max(most, kept);
   }
-  EXPECT_GT(least, 0.9);
-  EXPECT_LT(most, 1.001);
-  EXPECT_LT(most - least, 0.02);
+  EXPECT_GT(least, 0.93) << "BDF2 damps the waves that the impact leaves";
+  EXPECT_LT(most, 1);
+  EXPECT_LT(most - least, 0.005);
 }
 
 }  // namespace

@@ -400,7 +400,10 @@ TEST_F(SceneTest, StepsMayBeChosenByTheirErrors) {
   const auto scene = [&](const json& time) {
     json all = {{"dt", "auto"}, {"tend", 2}};
     all.update(time);
-    return square({{"time", all}, {"boundary_conditions", {{"dirichlet_boundary", json::array({condition})}}}});
+    const json body = {{"mesh", "square.obj"}, {"volume_selection", 1}, {"surface_selection", 1}};
+    return square({{"geometry", json::array({body})},
+                   {"time", all},
+                   {"boundary_conditions", {{"dirichlet_boundary", json::array({condition})}}}});
   };
   const itr::TimeOptions time = read2(scene({{"t0", 1e-3}, {"output_dt", 0.5}, {"tolerance", 0.02}})).time;
   EXPECT_TRUE(time.adaptive.enabled);

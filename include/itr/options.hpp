@@ -104,7 +104,7 @@ enum class Integrator { implicit_euler, newmark, bdf };
 /// Steps whose lengths follow from their errors (docs/theory.md, "Adaptive time").
 struct AdaptiveTimeOptions {
   bool enabled = false;
-  double tolerance = 0.01;    ///< of the energy norm: what a period of a free oscillation may add, about
+  double tolerance = 0.03;    ///< of the energy norm: what a period of a free oscillation may add, about
   double dt_min = 0;          ///< errors shorten no step below it [s]
   double dt_max = 0;          ///< [s]
   double begin = 0, end = 1;  ///< of the run [s]
