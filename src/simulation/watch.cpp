@@ -45,7 +45,7 @@ void Watch<Dim>::look(const Setup<Dim>& setup, const State<Dim>& state, const St
   if (!has_said_forces_) find_loose_forces(setup, state, report, logger);
   find_wide_gaps(setup, state, report, logger);
   if (!has_said_reactions_) find_unbalanced_reactions(setup, report, forces, logger);
-  if (!has_said_chords_) find_long_chords(setup, state, logger);
+  find_long_chords(setup, state, logger);
 }
 
 template <int Dim>
@@ -158,7 +158,6 @@ template <int Dim>
 void Watch<Dim>::find_long_chords(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger) {
   const double excess = find_chord_demand(setup, state.mesh, state.chords, state.history.x[0]).excess;
   if (excess <= 1) return;
-  has_said_chords_ = true;
   logger.warning(fmt::format(
       "step {}: curved edges leave the chords that contact acts on by {:.2g} times of what they may (a quarter of "
       "d-hat, half of the gap) and can have no shorter chords: a finer mesh helps",

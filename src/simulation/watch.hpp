@@ -21,8 +21,7 @@ class Watch {
                                  const Logger& logger);
   void find_long_chords(const Setup<Dim>& setup, const State<Dim>& state, const Logger& logger);
 
-  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false, has_said_reactions_ = false,
-       has_said_chords_ = false;
+  bool has_said_rotation_ = false, has_said_remeshing_ = false, has_said_forces_ = false, has_said_reactions_ = false;
   int loose_steps_ = 0, unbalanced_steps_ = 0;  ///< in a row
   double largest_reaction_ = 0;                 ///< at a vertex, so far [N]
   double most_elastic_ = 0;                     ///< energy of a step so far [J]

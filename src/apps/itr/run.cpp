@@ -66,12 +66,9 @@ void on_interrupt(int signal) {
 /// Says warnings, and gives them to the results' files too.
 class Warnings {
  public:
-  /// Says it after "warning:", the first times that there is one of its kind, and passes it on to the writer.
+  /// Says it after "warning:" where it is the first of its kind, and passes it on to the writer, which counts the others.
   void add(std::string_view text) {
-    constexpr int kMostOfAKind = 3;
-    const int times = ++said_[output::kind_of_warning(text)];
-    if (times <= kMostOfAKind)
-      spdlog::warn("warning: {}{}", text, times == kMostOfAKind ? " (more of this kind are counted, not said)" : "");
+    if (++said_[output::kind_of_warning(text)] == 1) spdlog::warn("warning: {}", text);
     if (writer_)
       writer_->warn(std::string(text));
     else
