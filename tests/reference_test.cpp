@@ -127,6 +127,7 @@ TEST_F(Defaults, OfTheTableAreThoseOfTheReader) {
       if (pattern.ends_with("/beta") || pattern.ends_with("/gamma") || pattern.ends_with("_growth_limit"))
         scene["time"]["integrator"]["type"] = "ImplicitNewmark";
       if (pattern.ends_with("/steps")) scene["time"]["integrator"]["type"] = "BDF";
+      if (pattern == "/time/tolerance") scene["time"]["dt"] = "auto";
       Json& nonlinear = scene["solver"]["nonlinear"];  // with the vocabulary of tolerances that the key is of
       if (pattern.ends_with("/x_delta") || pattern.ends_with("/f_delta"))
         nonlinear["grad_norm"] = 1e-8;
