@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "itr/core.hpp"
 #include "linear/blas_kernels.hpp"
 #include "linear_systems.hpp"
 
