@@ -70,11 +70,10 @@ EigenSystem<Dim> isotropic_eigensystem(const SingularValues<Dim>& svd, const Inv
   for (int i = 0; i < Dim; ++i) slope.row(i) << 2 * s[i], 4 * s[i] * s[i] * s[i], 1, J / s[i];
   const double W_a = W.first[InvariantDerivatives::a], W_q = W.first[InvariantDerivatives::q];
   const double W_t = W.first[InvariantDerivatives::t], W_J = W.first[InvariantDerivatives::J];
-  StretchStiffness<Dim> stiffness;
-  stiffness.scaling = slope * W.second * slope.transpose();
+  Mat<Dim> scaling = slope * W.second * slope.transpose();
   for (int i = 0; i < Dim; ++i)
-    for (int j = 0; j < Dim; ++j)
-      stiffness.scaling(i, j) += i == j ? 2 * W_a + 12 * s[i] * s[i] * W_q : W_J * J / (s[i] * s[j]);
+    for (int j = 0; j < Dim; ++j) scaling(i, j) += i == j ? 2 * W_a + 12 * s[i] * s[i] * W_q : W_J * J / (s[i] * s[j]);
+  StretchStiffness<Dim> stiffness{scaling, {}, {}};
   for (int i = 0, pair = 0; i < Dim; ++i)
     for (int j = i + 1; j < Dim; ++j, ++pair) {
       const double squares = s[i] * s[i] + s[j] * s[j], product = s[i] * s[j], rest = W_J * J / product;
