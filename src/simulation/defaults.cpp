@@ -23,8 +23,8 @@ namespace {
 
 constexpr double kSoftness = 0.1;          ///< barrier stiffness by modulus: gaps of about dhat / 2 at strains of a tenth
 constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, little beside usual deformations
-/// Where prescribed motions press bodies without inertia, gaps add to what these are compressed by. Curved edges would need
-/// chords that are too short.
+/// Where prescribed motions press bodies without inertia, gaps add to what these are compressed by. In 3D, chords of
+/// curved edges and remeshing, which resolve contact as far as dhat does, would cost too much.
 constexpr double kDhatByThicknessIfPressed = 2e-4;
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
 constexpr double kLeastDhat = 0.01;     ///< of that without the gap: what nearly touches presses a little at the start
@@ -158,7 +158,7 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
   const double motion = setup.time.has_inertia() ? std::numeric_limits<double>::infinity() : prescribed_motion(setup);
   const bool has_curves =
       setup.remesh.curve.enabled || std::ranges::any_of(setup.order, [](const auto& entry) { return entry.second > 1; });
-  const bool is_pressed = std::isfinite(motion) && !has_curves;
+  const bool is_pressed = std::isfinite(motion) && !(Dim == 3 && (has_curves || setup.remesh.enabled));
   const double by_thickness = is_pressed ? kDhatByThicknessIfPressed : kDhatByThickness;
   dhat = std::min({by_thickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * motion});
   double gap = std::numeric_limits<double>::infinity();
