@@ -171,6 +171,11 @@ class StepSolver {
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
     next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
+    if (tools_.errors) {
+      const ScopedTimer timer(report_.errors.seconds);
+      const auto phase = ScopedPhase::coarse("error bars");
+      result.errors = tools_.errors->estimate(setup_, next_, *problem_, x_, report_.errors);
+    }
     next_.factor = tools_.solver.record();
     next_.stiffness = problem_->stiffness();
     next_.quadrature = problem_->quadrature_levels();
@@ -204,7 +209,8 @@ class StepSolver {
   /// Ends a step that has failed.
   StepResult drop(const StepFailure& failure) {
     clock_.tell(report_);
-    StepResult result{.ok = false, .reason = failure.reason, .report = report_, .forces = {}, .renumbering = {}};
+    StepResult result{
+        .ok = false, .reason = failure.reason, .report = report_, .forces = {}, .errors = {}, .renumbering = {}};
     result.cancelled = failure.kind == StepFailure::Kind::cancelled;
     return result;
   }
