@@ -55,7 +55,8 @@ class ForceCurvesTest : public ::testing::Test {
     std::map<std::string, std::map<std::string, double>> values;
     while (std::getline(lines, line)) {
       const std::vector<std::string> row = cells();
-      for (std::size_t i = 3; i < row.size(); ++i) values[row[2]][head.at(i)] = std::stod(row[i]);
+      for (std::size_t i = 3; i < row.size(); ++i)
+        if (!row[i].empty()) values[row[2]][head.at(i)] = std::stod(row[i]);
     }
     return values;
   }
@@ -114,6 +115,32 @@ TEST_F(ForceCurvesTest, NoRowIsLostThatFramesDoNotHave) {
   EXPECT_EQ(itr(command), 2);
   EXPECT_NE(said_.find("forces.csv: line "), std::string::npos) << said_;
   EXPECT_EQ(text("run/forces.csv"), noted);
+}
+
+TEST_F(ForceCurvesTest, HaveErrorBarsAndPointsWhereTheyAreAskedFor) {
+  const char* asked =
+      "--set /time/tend=0.1 --set /output/error_bars=true --set /space/remesh/enabled=false "
+      "--set '/output/points=[{\"name\": \"apex\", \"rest\": [0, 0.05]}]'";
+  ASSERT_EQ(press("bars", asked), 0) << said_;
+  EXPECT_NE(said_.find("peak force on top "), std::string::npos) << said_;
+  EXPECT_NE(said_.find(" first\n"), std::string::npos) << said_;
+  auto sums = last("bars/forces.csv");
+  for (const char* source : {"mesh", "dhat", "friction", "lag", "solver"}) {
+    const std::string name = std::string("_error_") + source;
+    ASSERT_TRUE(sums["top"].contains("all_y" + name)) << name;
+    const double error = sums["top"]["all_y" + name];
+    EXPECT_NEAR(sums["bottom"]["all_y" + name], -error, 0.02 * std::abs(sums["top"]["all_y"])) << name;
+  }
+  EXPECT_GT(std::abs(sums["top"]["all_y_error_mesh"]), 1e-3 * sums["top"]["all_y"]);
+  EXPECT_NE(text("bars/steps.jsonl").find(R"("bars":{"energy":{"mesh":)"), std::string::npos);
+  EXPECT_TRUE(text("bars/points.csv").starts_with("step,t,name,x,y,u_x,u_y,u_x_error_mesh,u_y_error_mesh,"));
+  const auto apex = last("bars/points.csv")["apex"];
+  EXPECT_NEAR(apex.at("y") - apex.at("u_y"), 0.05, 1e-12);
+  EXPECT_LT(apex.at("u_y"), -1e-4);
+
+  const std::string whole = text("bars/forces.csv");
+  ASSERT_EQ(itr("forces " + (folder_ / "bars").string()), 0) << said_;
+  EXPECT_EQ(text("bars/forces.csv"), whole);
 }
 
 TEST_F(ForceCurvesTest, RefuseWhatNothingHas) {

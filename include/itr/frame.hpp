@@ -92,6 +92,26 @@ struct RejectedStep {
   std::string reason;  ///< "error in time", "impact", or why no solution was found
 };
 
+/// Sources of errors that a step estimates (docs/theory.md, "Error bars"). In the order of files.
+enum class ErrorSource {
+  mesh,      ///< cells are too large
+  dhat,      ///< contact acts from a distance
+  friction,  ///< friction is smoothed below a velocity
+  lag,       ///< friction and others are those of an iterate before
+  solver     ///< iterations ended
+};
+inline constexpr int kErrorSources = 5;
+/// As in files.
+ITR_EXPORT std::string_view name(ErrorSource source);
+
+/// Estimated errors of the energy: what is to be added to it for a better one.
+struct ErrorReport {
+  bool is_asked = false;
+  std::array<double, kErrorSources> energy{};  ///< of the total, by ErrorSource [J]
+  std::string no_bar{};                        ///< why there is no estimate; empty: there is one
+  double seconds = 0;                          ///< that the estimate took
+};
+
 struct ITR_EXPORT StepReport {
   int step = 0;
   double t = 0;   ///< [s]
@@ -133,6 +153,7 @@ struct ITR_EXPORT StepReport {
   StepSeconds seconds;
   double processor_seconds = 0;  ///< of the whole process, all threads, from begin to end of the step, without output
   double peak_rss_mb = 0;
+  ErrorReport errors;  ///< where FieldOptions::error_bars asks for them
 
   /// Adds the effort of what came before: iterations, operations, forgotten history and momentum, damped and cut steps,
   /// seconds, processor seconds.
@@ -159,12 +180,30 @@ inline constexpr std::array kForcesOnBodies{&NodalForces::contact, &NodalForces:
                                             &NodalForces::applied, &NodalForces::body,     &NodalForces::residual};
 inline constexpr std::array kForcesOnObstacles{&NodalForces::obstacle_contact, &NodalForces::obstacle_friction};
 
+/// Estimated errors by ErrorSource, as ErrorReport; empty: there are none.
+struct ErrorFields {
+  struct OfSource {
+    NodalForces forces;    ///< those that the setup asks for
+    VectorX displacement;  ///< of the bodies' nodes, interleaved [m]
+  };
+  std::vector<OfSource> sources;
+};
+
 /// Forces on a ForceTarget: on each line force (Dim numbers) [N] and moment (1 in 2D, 3 in 3D) [N m], of contact, friction,
 /// reactions, all (with tractions, pressures and forces of the program), body forces, the residual, and the momentum of its
 /// bodies that edits changed.
 struct ForceCurvePoint {
   std::string name;
   std::array<std::vector<double>, 7> kinds;  ///< the last three are empty where a stored frame does not have them
+  /// Estimated errors of the first four, by ErrorSource; empty: there are none.
+  std::vector<std::array<std::vector<double>, 4>> errors{};
+};
+
+/// A PointTarget at the end of a step.
+struct PointValue {
+  std::string name;
+  std::vector<double> x, u;                   ///< position and displacement, Dim numbers each [m]
+  std::vector<std::vector<double>> errors{};  ///< estimated, of u, by ErrorSource; empty: there are none
 };
 
 /// Fields that a scene may ask for (FieldOptions); empty where it does not.
@@ -175,6 +214,7 @@ struct AskedFields {
   std::vector<double> kinetic_energy;  ///< of all bodies, one number [J]
   std::vector<double> momentum;        ///< of all bodies, Dim numbers [kg m/s]
   std::vector<ForceCurvePoint> curves;
+  std::vector<PointValue> points;
 };
 
 /// The surface that touches in place of the bodies' boundary, see CollisionProxy. Null: there is none.

@@ -84,6 +84,12 @@ struct ForceTarget {
   std::array<double, 3> about{};         ///< point of moments [m]
 };
 
+/// A point of a body of which the displacement is asked for.
+struct PointTarget {
+  std::string name{};
+  std::array<double, 3> rest{};  ///< its rest position [m]
+};
+
 /// Ids that names stand for: of bodies, and of facets and vertices (their tags). An id may stand in several.
 struct SetNames {
   std::map<std::string, std::vector<int>> bodies, surfaces;
@@ -96,6 +102,8 @@ struct FieldOptions {
   bool kinetic_energy = false, momentum = false;
   bool applied_forces = false;
   std::vector<ForceTarget> curves{};  ///< summed forces
+  std::vector<PointTarget> points{};  ///< displacements
+  bool error_bars = false;            ///< estimate errors of energy, curves and points
   bool any_forces() const {
     return contact_forces || friction_forces || reaction_forces || applied_forces || !curves.empty();
   }

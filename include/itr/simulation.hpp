@@ -28,6 +28,7 @@ struct StepResult {
   std::string reason;      ///< if not ok: why the step failed; the state is as before it
   StepReport report;
   NodalForces forces;           ///< the forces that the setup asks for
+  ErrorFields errors;           ///< where it asks for error bars
   MeshRenumbering renumbering;  ///< of the mesh, where the step changed it; else empty
 };
 
@@ -37,7 +38,8 @@ struct Snapshot {
   std::shared_ptr<const State<Dim>> state;
   TimeOptions time;
   NodalForces forces;
-  std::optional<StepReport> report;   ///< empty: nobody has asked for it
+  std::optional<StepReport> report;  ///< empty: nobody has asked for it
+  ErrorFields errors{};
   std::shared_ptr<const void> owner;  ///< names the simulation that saved it
 };
 

@@ -143,6 +143,11 @@ SystemReport ReusingSolver::solve_by_factor(std::span<const double> values, std:
   return with_solution(report, asked, [&] { return solve(b, x, 1, asked.residual); });
 }
 
+bool ReusingSolver::precondition(std::span<const double> residual, std::span<double> z) {
+  return factor_.matrix && static_cast<std::size_t>(factor_.matrix->pattern->order) == residual.size() &&
+         solver_.solve(residual, z, 1, kNoResidual).outcome == Outcome::ok;
+}
+
 std::string ReusingSolver::message() const {
   return last_ == Last::refused ? "iterations met a direction of negative curvature" : solver_.message();
 }
@@ -186,12 +191,10 @@ void ReusingSolver::iterate(std::span<const double> values, std::span<const doub
   const SystemView system{*pattern_, values, b};
   const double scale = ConjugateGradients::norm(b), from = goes_on ? iteration_->residual() : 1;
   if (!(scale > 0) || !std::isfinite(scale)) return;
-  const auto precondition = [this](std::span<const double> residual, std::span<double> z) {
-    return solver_.solve(residual, z, 1, kNoResidual).outcome == Outcome::ok;  // which would be that of the old matrix
-  };
-  if (!goes_on && !iteration_->begin(system, precondition)) return pause();
+  const auto by_factor = [this](std::span<const double> residual, std::span<double> z) { return precondition(residual, z); };
+  if (!goes_on && !iteration_->begin(system, by_factor)) return pause();
   const Costs cost = costs();
-  const auto end = iteration_->run(system, precondition, asked, cost.most_iterations() - iterations_);
+  const auto end = iteration_->run(system, by_factor, asked, cost.most_iterations() - iterations_);
   const int used = iteration_->iterations();
   iterations_ += used;
   counts_.iterations += used;

@@ -73,6 +73,8 @@ class ReusingSolver final : public Solver {
   /// iterations, else factorises it first. If x is empty, only what the matrix is is found out.
   SystemReport solve_system(std::span<const double> values, std::span<const double> b, const Asked& asked,
                             std::span<double> x);
+  /// Solves with the factor that is there, whatever matrix of this order it is of. False where there is none.
+  bool precondition(std::span<const double> residual, std::span<double> z);
   /// Whether the matrix given last has been factorised.
   bool has_factor() const { return last_ == Last::factorized || last_ == Last::found; }
 

@@ -92,6 +92,7 @@ class SparseSystem final : public NewtonSystem {
   /// before.
   void reset(const DofMap& dofs, int dim, std::vector<Stencils> stencils);
   linear::Solver& solver() { return solver_; }
+  const SparseAssembler& assembler() const { return assembler_; }
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                              VectorView solution) override;

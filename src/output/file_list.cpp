@@ -19,10 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 
 /// How files that a run writes beside its frames begin.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kFiles = {{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kFiles = {{
     {"steps.jsonl", "{\"step\":"},
     {"summary.json", "{\"scene\":"},
     {"forces.csv", "step,t,name,"},
+    {"points.csv", "step,t,name,"},
     {"profile.jsonl", "{\"step\":"},
     {"sim.h5", "\x89HDF"},
     {"sim.xdmf", "<?xml"},

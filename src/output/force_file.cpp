@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 #include <map>
 #include <utility>
@@ -19,7 +21,7 @@ namespace {
 
 constexpr const char* kKinds[] = {"contact", "friction", "reaction", "all", "body", "residual", "remeshing"};
 
-/// Names the columns that a curve has.
+/// Names the columns that a curve has. Those of errors follow, of the first four kinds by source.
 std::string header(const ForceCurvePoint& curve) {
   const std::size_t columns = curve.kinds.front().size();
   const std::vector<const char*> names = columns == 3 ? std::vector<const char*>{"x", "y", "moment"}
@@ -27,7 +29,38 @@ std::string header(const ForceCurvePoint& curve) {
   std::string text = "step,t,name";
   for (std::size_t k = 0; k < curve.kinds.size(); ++k)
     for (std::size_t c = 0; c < curve.kinds[k].size(); ++c) text += fmt::format(",{}_{}", kKinds[k], names[c]);
+  for (std::size_t s = 0; s < curve.errors.size(); ++s)
+    for (std::size_t k = 0; k < curve.errors[s].size(); ++k)
+      for (std::size_t c = 0; c < columns; ++c)
+        text += fmt::format(",{}_{}_error_{}", kKinds[k], names[c], name(static_cast<ErrorSource>(s)));
   return text;
+}
+
+std::string header(const PointValue& point) {
+  constexpr std::array kAxes{"x", "y", "z"};
+  const std::size_t dim = point.x.size();
+  std::string text = "step,t,name";
+  for (const char* what : {"", "u_"})
+    for (std::size_t c = 0; c < dim; ++c) text += fmt::format(",{}{}", what, kAxes[c]);
+  for (std::size_t s = 0; s < point.errors.size(); ++s)
+    for (std::size_t c = 0; c < dim; ++c) text += fmt::format(",u_{}_error_{}", kAxes[c], name(static_cast<ErrorSource>(s)));
+  return text;
+}
+
+/// Adds numbers, of which those that are not known (NaN) are empty.
+void add_values(const std::vector<double>& values, std::string& line) {
+  for (const double value : values) line += std::isnan(value) ? "," : fmt::format(",{}", value == 0 ? 0.0 : value);
+}
+
+std::vector<std::string> lines_of(int step, double t, const std::vector<PointValue>& points) {
+  std::vector<std::string> lines;
+  for (const PointValue& point : points) {
+    std::string& line = lines.emplace_back(fmt::format("{},{},{}", step, t, point.name));
+    add_values(point.x, line);
+    add_values(point.u, line);
+    for (const auto& source : point.errors) add_values(source, line);
+  }
+  return lines;
 }
 
 /// A line for each curve.
@@ -35,8 +68,9 @@ std::vector<std::string> lines_of(int step, double t, const std::vector<ForceCur
   std::vector<std::string> lines;
   for (const ForceCurvePoint& curve : curves) {
     std::string& line = lines.emplace_back(fmt::format("{},{},{}", step, t, curve.name));
-    for (const auto& kind : curve.kinds)
-      for (const double value : kind) line += fmt::format(",{}", value == 0 ? 0.0 : value);
+    for (const auto& kind : curve.kinds) add_values(kind, line);
+    for (const auto& source : curve.errors)
+      for (const auto& kind : source) add_values(kind, line);
   }
   return lines;
 }
@@ -65,6 +99,23 @@ std::optional<std::pair<int, Row>> parse_row(const std::string& line, const std:
   return std::pair{step, Row{line.substr(second + 1, third - second - 1), line}};
 }
 
+/// Gives the header those columns of errors that a file has and frames have not. Returns their number.
+std::size_t extend_header(const std::filesystem::path& path, std::string& head) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  if (!std::getline(file, line) || file.eof() || !line.starts_with(head + ',')) return 0;
+  const std::string errors = line.substr(head.size());
+  head = line;
+  return static_cast<std::size_t>(std::count(errors.begin(), errors.end(), ','));
+}
+
+/// The last columns of a line, each with the comma before it.
+std::string last_columns(const std::string& line, std::size_t columns) {
+  std::size_t begin = line.size();
+  for (; columns > 0; --columns) begin = line.rfind(',', begin - 1);
+  return line.substr(begin);
+}
+
 /// The rows of a folder's forces.csv, none without one. Throws InputError where a line is none: to write the file anew would
 /// lose it.
 RowList read_rows(const std::filesystem::path& directory, const std::string& head) {
@@ -87,7 +138,7 @@ RowList read_rows(const std::filesystem::path& directory, const std::string& hea
 
 }  // namespace
 
-ForceFile::ForceFile(std::filesystem::path directory, int last_step) : path_(std::move(directory) / kForceFile) {
+CurveFile::CurveFile(std::filesystem::path path, int last_step) : path_(std::move(path)) {
   if (last_step < 0) return;
   const std::size_t keep = length_until(path_, last_step);
   if (keep > 0)
@@ -96,17 +147,24 @@ ForceFile::ForceFile(std::filesystem::path directory, int last_step) : path_(std
     std::filesystem::remove(path_);
 }
 
-void ForceFile::add(int step, double t, const std::vector<ForceCurvePoint>& curves) {
-  if (curves.empty()) return;
+void CurveFile::add(const std::string& header, std::vector<std::string> lines) {
   if (!file_) {
     file_.emplace(path_, 0);
-    file_->append(header(curves.front()));
+    file_->append(header);
   }
   size_before_ = file_->size();
-  for (std::string& line : lines_of(step, t, curves)) file_->append(std::move(line));
+  for (std::string& line : lines) file_->append(std::move(line));
 }
 
-void ForceFile::drop_last() {
+void CurveFile::add(int step, double t, const std::vector<ForceCurvePoint>& curves) {
+  if (!curves.empty()) add(header(curves.front()), lines_of(step, t, curves));
+}
+
+void CurveFile::add(int step, double t, const std::vector<PointValue>& points) {
+  if (!points.empty()) add(header(points.front()), lines_of(step, t, points));
+}
+
+void CurveFile::drop_last() {
   if (file_) file_->shorten(size_before_);
 }
 
@@ -127,13 +185,15 @@ ForceRows rewrite_forces(const std::filesystem::path& directory) {
   if (from_frames.empty())
     throw InputError({directory.string(), "frames", "none with forces", "a run of a scene with /output/forces"});
   folder.resume({kForceFile}, from_frames.rbegin()->first);
+  const std::size_t errors = extend_header(directory / kForceFile, head);
   RowList rows = read_rows(directory, head);
   for (auto& [step, of_step] : from_frames) {
     for (Row& row : of_step) {
       const auto same = std::find_if(rows[step].begin(), rows[step].end(), [&](const Row& r) { return r.name == row.name; });
       if (same != rows[step].end()) {
-        *same = std::move(row);
+        same->line = row.line + last_columns(same->line, errors);
       } else {
+        row.line.append(errors, ',');
         rows[step].push_back(std::move(row));
         ++count.added;
       }

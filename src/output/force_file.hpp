@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// forces.csv: the sums that /output/forces asks for, a line a step and name.
+// forces.csv and points.csv: what /output/forces and /output/points ask for, a line a step and name.
 #pragma once
 
 #include <filesystem>
@@ -13,17 +13,22 @@
 namespace itr::output {
 
 constexpr const char* kForceFile = "forces.csv";
+constexpr const char* kPointFile = "points.csv";
 
-class ForceFile {
+/// A file with lines for each step under a header.
+class CurveFile {
  public:
   /// Keeps the lines of steps up to `last_step`; -1: there is no file yet.
-  ForceFile(std::filesystem::path directory, int last_step);
-  /// Without curves: nothing, and no file.
+  CurveFile(std::filesystem::path path, int last_step);
+  /// Without curves or points: nothing, and no file.
   void add(int step, double t, const std::vector<ForceCurvePoint>& curves);
+  void add(int step, double t, const std::vector<PointValue>& points);
   /// Takes back the lines of the last step.
   void drop_last();
 
  private:
+  void add(const std::string& header, std::vector<std::string> lines);
+
   std::filesystem::path path_;
   std::optional<LineFile> file_;
   std::size_t size_before_ = 0;

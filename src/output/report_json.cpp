@@ -78,6 +78,15 @@ Json to_json(const std::vector<RejectedStep>& rejections) {
   return json;
 }
 
+/// The errors of the energy by source, or why there are none.
+Json to_json(const ErrorReport& errors) {
+  if (!errors.no_bar.empty()) return {{"no_bar", errors.no_bar}, {"seconds", to_json(errors.seconds)}};
+  Json energy;
+  for (int s = 0; s < kErrorSources; ++s) energy[std::string(name(static_cast<ErrorSource>(s)))] = to_json(errors.energy[s]);
+  return {{"energy", energy}, {"seconds", to_json(errors.seconds)}};
+}
+
+bool is_there(const ErrorReport& errors, unsigned) { return errors.is_asked; }
 template <typename Value>
 bool is_there(const Value& value, unsigned shown) {
   if constexpr (std::is_arithmetic_v<Value>)
@@ -148,9 +157,10 @@ template <typename Fields, typename Whole>
 void read_fields(const Fields& fields, const Json& json, Whole& whole);
 void from_json(const Json& json, EnergyReport& energy) { read_fields(kEnergyFields, json, energy); }
 void from_json(const Json& json, StepSeconds& seconds) { read_fields(kSecondsFields, json, seconds); }
-/// Reads nothing: momentum by body and rejected trials are in no total.
+/// Reads nothing: momentum by body, rejected trials and errors are in no total.
 void from_json(const Json&, std::vector<MomentumChange>&) {}
 void from_json(const Json&, std::vector<RejectedStep>&) {}
+void from_json(const Json&, ErrorReport&) {}
 
 template <typename Fields, typename Whole>
 void read_fields(const Fields& fields, const Json& json, Whole& whole) {

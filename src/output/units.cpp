@@ -17,10 +17,28 @@ std::vector<double> in_units(std::span<const double> values, const Units& units,
 
 std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const Units& units) {
   const double force = units.factor("N"), moment = units.factor("N m");
-  for (ForceCurvePoint& curve : curves)
-    for (auto& kind : curve.kinds)
+  for (ForceCurvePoint& curve : curves) {
+    const auto convert = [&](std::vector<double>& kind) {
       for (std::size_t i = 0; i < kind.size(); ++i) kind[i] /= i < static_cast<std::size_t>(units.dim) ? force : moment;
+    };
+    for (auto& kind : curve.kinds) convert(kind);
+    for (auto& source : curve.errors)
+      for (auto& kind : source) convert(kind);
+  }
   return curves;
+}
+
+std::vector<PointValue> in_units(std::vector<PointValue> points, const Units& units) {
+  const double length = units.factor("m");
+  const auto convert = [&](std::vector<double>& values) {
+    for (double& value : values) value /= length;
+  };
+  for (PointValue& point : points) {
+    convert(point.x);
+    convert(point.u);
+    for (auto& source : point.errors) convert(source);
+  }
+  return points;
 }
 
 StepReport in_units(StepReport report, const Units& units) {
@@ -32,6 +50,7 @@ StepReport in_units(StepReport report, const Units& units) {
   for_each_field(kStepFields, [&](const auto& field) { convert(report, field); });
   for_each_field(kEnergyFields, [&](const auto& field) { convert(report.energy, field); });
   for (RejectedStep& step : report.rejections) step.dt = units.from_si(step.dt, "s");
+  for (double& error : report.errors.energy) error = units.from_si(error, "J");
   const double momentum = units.factor("kg m/s"), angular = units.factor("kg m^2/s");
   for (MomentumChange& change : report.remeshing) {
     for (double& value : change.linear) value /= momentum;

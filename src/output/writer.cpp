@@ -48,7 +48,8 @@ struct Writer::Impl {
         info(std::move(run_info)),
         stored(begin(last_step)),
         steps(directory / "steps.jsonl", log_bytes),
-        forces(directory, folder.owns(kForceFile) ? last_step : -1),
+        forces(directory / kForceFile, folder.owns(kForceFile) ? last_step : -1),
+        points(directory / kPointFile, folder.owns(kPointFile) ? last_step : -1),
         series(directory, stored) {
     if (options.vtu) begin_vtu_series();
     if (last_step >= 0) removed_files = folder.remove_after(last_step);  // nothing names these frames any more
@@ -169,7 +170,7 @@ struct Writer::Impl {
   int removed_files = 0;
   std::vector<FrameEntry> stored;  ///< while the series are begun
   LineFile steps;
-  ForceFile forces;
+  CurveFile forces, points;
   TimeSeries series;
   std::optional<SeriesText> vtu_series;
   FrameFiles frames;
@@ -213,9 +214,15 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
   Json line = step_json(in_units(report, units));
   if (Json warnings = impl_->warnings.take_new(); !warnings.empty()) line["warnings"] = std::move(warnings);
   impl_->steps.append(text_of(line));
-  if (frame.asked && !frame.asked->curves.empty()) impl_->folder.claim(kForceFile);
-  const bool has_forces = frame.asked && impl_->options.times.is_asked(report.t);
-  if (has_forces) impl_->forces.add(report.step, units.from_si(report.t, "s"), in_units(frame.asked->curves, units));
+  const AskedFields none, &asked = frame.asked ? *frame.asked : none;
+  const double t = units.from_si(report.t, "s");
+  if (!asked.curves.empty()) impl_->folder.claim(kForceFile);
+  if (!asked.points.empty()) impl_->folder.claim(kPointFile);
+  const bool has_rows = impl_->options.times.is_asked(report.t);
+  if (has_rows) {
+    impl_->forces.add(report.step, t, in_units(asked.curves, units));
+    impl_->points.add(report.step, t, in_units(asked.points, units));
+  }
   impl_->totals.add(report);
   impl_->norms = displacement_norms(frame.mesh, frame.x);
   if (!checkpoint && !impl_->is_due(report.step, report.t)) return;
@@ -223,7 +230,8 @@ void Writer::write(const FrameView<Dim>& frame, const StepReport& report, const 
     impl_->store(frame, report.step, report.t, checkpoint);
   } catch (const InputError&) {
     impl_->steps.shorten(length);  // a step whose frame is not there was not done
-    if (has_forces && !frame.asked->curves.empty()) impl_->forces.drop_last();
+    if (has_rows && !asked.curves.empty()) impl_->forces.drop_last();
+    if (has_rows && !asked.points.empty()) impl_->points.drop_last();
     throw;
   }
   impl_->index(frame, report.step, report.t);

@@ -103,6 +103,7 @@ py::object to_python(const itr::EnergyReport& energy) {
 /// No program is shown these.
 py::object to_python(const std::vector<itr::MomentumChange>&) { return py::none(); }
 py::object to_python(const std::vector<itr::RejectedStep>&) { return py::none(); }
+py::object to_python(const itr::ErrorReport&) { return py::none(); }
 
 py::dict describe(const itr::StepReport& report) {
   py::dict result;

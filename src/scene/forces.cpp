@@ -8,6 +8,23 @@ namespace itr::scene {
 
 namespace {
 
+std::string read_name(const Node& node, const char* what) {
+  const std::string name = node["name"].string("");
+  if (name.empty()) node["name"].fail(what);
+  if (name.find_first_of(",\"\n") != std::string::npos) node["name"].fail("a name without commas and quotes");
+  return name;
+}
+
+/// Reads Dim numbers.
+template <int Dim>
+std::array<double, 3> read_place(const Node& node) {
+  const std::vector<double> numbers = node.numbers();
+  if (numbers.size() != Dim) node.fail(std::to_string(Dim) + " numbers");
+  std::array<double, 3> place{};
+  std::copy(numbers.begin(), numbers.end(), place.begin());
+  return place;
+}
+
 template <int Dim>
 class ForceReader {
  public:
@@ -17,9 +34,7 @@ class ForceReader {
 
   ForceTarget read(const Node& node) const {
     ForceTarget target;
-    target.name = node["name"].string("");
-    if (target.name.empty()) node["name"].fail("the name of the curve");
-    if (target.name.find_first_of(",\"\n") != std::string::npos) node["name"].fail("a name without commas and quotes");
+    target.name = read_name(node, "the name of the curve");
     for (const Node& id : node["surfaces"].items()) add_new(surface(id), target.surfaces);
     for (const Node& id : node["bodies"].items()) add_new(body(id), target.bodies);
     std::set<int> vertices;
@@ -30,11 +45,7 @@ class ForceReader {
     target.obstacle_vertices.assign(vertices.begin(), vertices.end());
     if (target.surfaces.empty() && target.bodies.empty() && vertices.empty())
       node.fail("no surfaces, bodies or obstacles", "at least one of them");
-    if (const Node about = node["about"]; about.exists()) {
-      const std::vector<double> point = about.numbers();
-      if (point.size() != Dim) about.fail(std::to_string(Dim) + " numbers");
-      std::copy(point.begin(), point.end(), target.about.begin());
-    }
+    if (const Node about = node["about"]; about.exists()) target.about = read_place<Dim>(about);
     return target;
   }
 
@@ -130,7 +141,19 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
   return targets;
 }
 
+template <int Dim>
+std::vector<PointTarget> read_points(const Node& root) {
+  std::vector<PointTarget> targets;
+  std::set<std::string> names;
+  for (const Node& node : root["output"]["points"].items()) {
+    targets.push_back({read_name(node, "the name of the point"), read_place<Dim>(node["rest"])});
+    if (!names.insert(targets.back().name).second) node["name"].fail("a name that no entry before it has");
+  }
+  return targets;
+}
+
 #define ITR_INSTANTIATE(Dim)                                                                   \
+  template std::vector<PointTarget> read_points<Dim>(const Node&);                             \
   template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&, const Sets&); \
   template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Sets&, const Mesh<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

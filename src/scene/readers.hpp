@@ -97,5 +97,7 @@ PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& 
 /// Throws InputError for what nothing has, and for names that are there twice.
 template <int Dim>
 std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh);
+template <int Dim>
+std::vector<PointTarget> read_points(const Node& root);
 
 }  // namespace itr::scene

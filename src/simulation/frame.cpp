@@ -20,6 +20,11 @@ void add_changes(const std::vector<MomentumChange>& changes, double factor, std:
   }
 }
 
+std::string_view name(ErrorSource source) {
+  constexpr std::array<std::string_view, kErrorSources> kNames{"mesh", "dhat", "friction", "lag", "solver"};
+  return kNames[static_cast<std::size_t>(source)];
+}
+
 StepSeconds& StepSeconds::operator+=(const StepSeconds& other) {
   for_each_field(kSecondsFields, [&](const auto& field) { this->*field.member += other.*field.member; });
   return *this;
@@ -34,14 +39,16 @@ void add(const Value& before, Value& sum) {
 void add(const std::vector<RejectedStep>& before, std::vector<RejectedStep>& sum) {
   sum.insert(sum.begin(), before.begin(), before.end());
 }
+/// Leaves what belongs to the end of a step alone.
+void add(const EnergyReport&, EnergyReport&) {}
+void add(const ErrorReport&, ErrorReport&) {}
 void add(const std::vector<MomentumChange>& before, std::vector<MomentumChange>& sum) { add_changes(before, 1, sum); }
 
 }  // namespace
 
 void StepReport::add_effort(const StepReport& before) {
   for_each_field(kStepFields, [&](const auto& field) {
-    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(this->*field.member)>, EnergyReport>)
-      if (field.add_up == AddUp::sum) add(before.*field.member, this->*field.member);
+    if (field.add_up == AddUp::sum) add(before.*field.member, this->*field.member);
   });
 }
 

@@ -4,6 +4,7 @@
 // Data of a frame: energy densities and stresses by cell, sums of forces, energy and momentum.
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/law_sum.hpp"
 #include "energy/inertia.hpp"
+#include "fem/locator.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
 
@@ -46,16 +48,57 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
   }
 }
 
-template <int Dim>
-ForceCurvePoint curve_point(const ForceSums<Dim>& sums, const std::string& name) {
-  ForceCurvePoint point{name, {}};
-  const std::array<const Resultant<Dim>*, 7> kinds{&sums.contact, &sums.friction, &sums.reaction, &sums.all,
-                                                   &sums.body,    &sums.residual, &sums.remeshing};
-  for (std::size_t k = 0; k < kinds.size(); ++k) {
-    point.kinds[k].assign(kinds[k]->force.begin(), kinds[k]->force.end());
-    point.kinds[k].insert(point.kinds[k].end(), kinds[k]->moment.begin(), kinds[k]->moment.end());
+/// The first kinds of a ForceCurvePoint.
+template <std::size_t N, int Dim>
+std::array<std::vector<double>, N> kinds_of(const ForceSums<Dim>& sums) {
+  const std::array<const Resultant<Dim>*, 7> all{&sums.contact, &sums.friction, &sums.reaction, &sums.all,
+                                                 &sums.body,    &sums.residual, &sums.remeshing};
+  std::array<std::vector<double>, N> kinds;
+  for (std::size_t k = 0; k < N; ++k) {
+    kinds[k].assign(all[k]->force.begin(), all[k]->force.end());
+    kinds[k].insert(kinds[k].end(), all[k]->moment.begin(), all[k]->moment.end());
   }
+  return kinds;
+}
+
+/// Sums of forces on a target, with those of their errors by source; NaN where these are asked for and unknown.
+template <int Dim>
+ForceCurvePoint curve_point(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces,
+                            const ErrorFields& errors, const ForceTarget& target) {
+  ForceCurvePoint point{target.name, kinds_of<7>(sum_forces(state, forces, target))};
+  for (const auto& source : errors.sources) point.errors.push_back(kinds_of<4>(sum_forces(state, source.forces, target)));
+  if (!setup.fields.error_bars || !point.errors.empty()) return point;
+  std::array<std::vector<double>, 4> unknown;
+  unknown.fill(std::vector<double>(point.kinds[0].size(), std::numeric_limits<double>::quiet_NaN()));
+  point.errors.assign(kErrorSources, unknown);
   return point;
+}
+
+/// Displacements of targets, with their errors by source; NaN where these are asked for and unknown.
+template <int Dim>
+std::vector<PointValue> points_of(const Setup<Dim>& setup, const State<Dim>& state, const ErrorFields& errors) {
+  std::vector<PointValue> points;
+  if (setup.fields.points.empty()) return points;
+  const Locator<Dim> locator(state.mesh);
+  for (const PointTarget& target : setup.fields.points) {
+    const Vec<Dim> X(target.rest.data());
+    const auto place = locator.find(X);
+    const auto at = [&](const VectorX& field) {
+      std::vector<double> sum(Dim, 0.0);
+      for_each_weight<Dim>(place, [&](int node, double weight) {
+        for (int c = 0; c < Dim; ++c) sum[c] += weight * field[Dim * node + c];
+      });
+      return sum;
+    };
+    PointValue& point = points.emplace_back();
+    point.name = target.name;
+    point.u = point.x = at(state.history.x[0]);
+    for (int c = 0; c < Dim; ++c) point.u[c] -= X[c];
+    for (const auto& source : errors.sources) point.errors.push_back(at(source.displacement));
+    if (setup.fields.error_bars && point.errors.empty())
+      point.errors.assign(kErrorSources, std::vector<double>(Dim, std::numeric_limits<double>::quiet_NaN()));
+  }
+  return points;
 }
 
 /// Von Mises stress of the stress in space, of which `out_of_plane` is the third
@@ -101,7 +144,8 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const Quadratu
 
 /// Adds the fields that the setup asks for.
 template <int Dim>
-void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, FrameData<Dim>& data) {
+void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, const ErrorFields& errors,
+               FrameData<Dim>& data) {
   const FieldOptions& options = setup.fields;
   AskedFields& asked = data.asked;
   const NodalForces all = std::exchange(asked.forces, {});
@@ -109,8 +153,8 @@ void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<D
   if (options.friction_forces) asked.forces.friction = all.friction;
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
-  for (const ForceTarget& target : options.curves)
-    asked.curves.push_back(curve_point(sum_forces(state, all, target), target.name));
+  for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
+  asked.points = points_of(setup, state, errors);
   if (options.von_mises || options.stress) {
     CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup);
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
@@ -140,7 +184,8 @@ template CellStress cell_stress(const Simulation<2>&);
 template CellStress cell_stress(const Simulation<3>&);
 
 template <int Dim>
-FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces) {
+FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces,
+                          const ErrorFields& errors) {
   const int bodies = state.mesh.num_nodes();
   FrameData<Dim> data;
   data.x = state.history.x[0].head(Dim * bodies);
@@ -157,7 +202,7 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   };
   for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup.quadrature_degree, add_density);
   data.asked.forces = forces;
-  add_asked(setup, cells, state, data);
+  add_asked(setup, cells, state, errors, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (setup.proxy) {
@@ -168,7 +213,7 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   return data;
 }
 
-template FrameData<2> frame_data(const Setup<2>&, const State<2>&, const NodalForces&);
-template FrameData<3> frame_data(const Setup<3>&, const State<3>&, const NodalForces&);
+template FrameData<2> frame_data(const Setup<2>&, const State<2>&, const NodalForces&, const ErrorFields&);
+template FrameData<3> frame_data(const Setup<3>&, const State<3>&, const NodalForces&, const ErrorFields&);
 
 }  // namespace itr

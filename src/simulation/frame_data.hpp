@@ -16,8 +16,9 @@ struct FrameData {
   AskedFields asked;
 };
 
-/// Computes what output sees of a state; `forces` are those of the step that led to it.
+/// Computes what output sees of a state; `forces` and `errors` are those of the step that led to it.
 template <int Dim>
-FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces);
+FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, const NodalForces& forces,
+                          const ErrorFields& errors);
 
 }  // namespace itr

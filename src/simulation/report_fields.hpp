@@ -97,6 +97,7 @@ inline constexpr std::tuple kStepFields{
     ReportField{"residual_worth", &StepReport::residual_worth, AddUp::last, "J", in_step},
     ReportField{"split_tolerance", &StepReport::split_tolerance, AddUp::last, "J", in_step},
     ReportField{"best_refused_split", &StepReport::best_refused_split, AddUp::most, "J", in_step},
+    ReportField{"bars", &StepReport::errors, AddUp::last, "J", in_files},
     ReportField{"trial_seconds", &StepReport::trial_seconds, AddUp::last, "", in_step},
 };
 

@@ -50,16 +50,18 @@ struct Simulation<Dim>::Impl {
   const std::shared_ptr<const char> identity = std::make_shared<const char>();  ///< of what save() gave
   mutable std::atomic<Phase> phase = Phase::between_steps;                      ///< terms are asked by several threads
   EdgeLengths initial_edges;
-  NodalForces forces;                        ///< of the last step
-  mutable std::optional<StepReport> report;  ///< empty: of the state as it stands, not made yet
-  bool remeshing_is_complete = false;        ///< its tolerances are chosen
-  double first_dt = 1;                       ///< what the setup's tolerances are for [s]
+  NodalForces forces;                                    ///< of the last step
+  ErrorFields errors;                                    ///< of them
+  std::unique_ptr<ErrorEstimator<Dim>> error_estimator;  ///< null: nobody asks for error bars
+  mutable std::optional<StepReport> report;              ///< empty: of the state as it stands, not made yet
+  bool remeshing_is_complete = false;                    ///< its tolerances are chosen
+  double first_dt = 1;                                   ///< what the setup's tolerances are for [s]
   NewtonOptions first_newton;
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
   Watch<Dim> watch;
   std::optional<FlatObstacles<Dim>> flats;
 
-  StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger}; }
+  StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger, error_estimator.get()}; }
 
   /// While a step is taken, or a listener told of it.
   class Inside {
@@ -254,6 +256,7 @@ struct Simulation<Dim>::Impl {
 
   /// Sets the forces of a state that no step of this simulation led to.
   void set_forces_at_rest() {
+    errors = {};
     if (!setup.fields.any_forces()) return;
     const Inside inside(*this, Phase::in_step);
     StepProblem<Dim> problem(setup, state->mesh, state->history, state->t, *cache, state->stiffness, state->quadrature,
@@ -279,6 +282,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
       linear::choose_solver(linear, impl_->setup.newton.indefinite == IndefiniteHessian::accept, registry, impl_->logger);
   impl_->solver = std::make_unique<linear::ReusingSolver>(*impl_->direct);
   impl_->cache = std::make_unique<ProblemCache<Dim>>(*impl_->solver);
+  if (impl_->setup.fields.error_bars) impl_->error_estimator = std::make_unique<ErrorEstimator<Dim>>(*impl_->solver);
   impl_->first_dt = impl_->setup.time.dt;
   impl_->first_newton = impl_->setup.newton;
   auto state = std::make_shared<State<Dim>>(initial_state(impl_->setup));
@@ -350,6 +354,7 @@ StepResult Simulation<Dim>::advance() {
   if (result.report.dt > 0) impl_->setup.time.dt = result.report.dt;  // the trials before may have been longer
   impl_->add_remeshing(result.report, result.forces);
   impl_->forces = result.forces;
+  impl_->errors = result.errors;
   impl_->report = result.report;
   impl_->watch.look(impl_->setup, *impl_->state, result.report, result.forces, impl_->logger);
   impl_->tell(*before, result);
@@ -376,7 +381,7 @@ void Simulation<Dim>::on_mesh_change(std::function<void(const MeshChange<Dim>&, 
 
 template <int Dim>
 Snapshot<Dim> Simulation<Dim>::save() const {
-  return {impl_->state, impl_->setup.time, impl_->forces, impl_->report, impl_->identity};
+  return {impl_->state, impl_->setup.time, impl_->forces, impl_->report, impl_->errors, impl_->identity};
 }
 
 template <int Dim>
@@ -389,6 +394,7 @@ void Simulation<Dim>::restore(const Snapshot<Dim>& snapshot) {
   impl_->setup.time = snapshot.time;
   impl_->scale_tolerances();
   impl_->forces = snapshot.forces;
+  impl_->errors = snapshot.errors;
   impl_->report = snapshot.report;
 }
 
@@ -449,7 +455,7 @@ template <int Dim>
 void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
                               const std::function<void(const FrameView<Dim>&)>& observer) const {
   const Setup<Dim>& setup = impl_->setup;
-  const FrameData<Dim> data = frame_data(setup, *snapshot.state, snapshot.forces);
+  const FrameData<Dim> data = frame_data(setup, *snapshot.state, snapshot.forces, snapshot.errors);
   FrameView<Dim> frame{snapshot.state->mesh,      data.x,          data.v,
                        data.elastic_density,      data.obstacle_x, setup.obstacles.edges,
                        setup.obstacles.triangles, &data.asked};

@@ -179,6 +179,11 @@ class StepSolver {
       report_.time_error = errors_.error;
       next_.control = StepController(setup_.time).after(before_.control, errors_, trial_, setup_.time.dt, energy_);
     }
+    if (tools_.errors) {
+      const ScopedTimer timer(report_.errors.seconds);
+      const auto phase = ScopedPhase::coarse("error bars");
+      result.errors = tools_.errors->estimate(setup_, next_, *problem_, x_, report_.errors);
+    }
     next_.factor = tools_.solver.record();
     next_.stiffness = problem_->stiffness();
     next_.quadrature = problem_->quadrature_levels();
@@ -218,7 +223,8 @@ class StepSolver {
       report_.rejections = {
           {setup_.time.dt, is_error ? errors_.error : std::numeric_limits<double>::quiet_NaN(), failure.reason}};
     }
-    StepResult result{.ok = false, .reason = failure.reason, .report = report_, .forces = {}, .renumbering = {}};
+    StepResult result{
+        .ok = false, .reason = failure.reason, .report = report_, .forces = {}, .errors = {}, .renumbering = {}};
     result.cancelled = failure.kind == StepFailure::Kind::cancelled;
     return result;
   }

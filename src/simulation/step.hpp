@@ -2,6 +2,7 @@
 #pragma once
 
 #include "itr/core.hpp"
+#include "simulation/error_estimator.hpp"
 #include "simulation/state.hpp"
 #include "simulation/step_ladder.hpp"
 #include "simulation/step_problem.hpp"
@@ -23,6 +24,7 @@ struct StepTools {
   ProblemCache<Dim>& cache;
   linear::ReusingSolver& solver;  ///< that of `cache`
   const Logger& logger;
+  ErrorEstimator<Dim>* errors = nullptr;  ///< null: nobody asks for error bars
 };
 
 /// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again. If

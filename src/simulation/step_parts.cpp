@@ -84,7 +84,7 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
                                const Attempt& attempt, StepResult failed) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepSetup<Dim> half = halved(setup, before);
-  const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger};
+  const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger, tools.errors};
   tools.logger.warning("the step to t = " + setup.units.text(failed.report.t, "s", 6) + " failed (" + failed.reason +
                        "), cutting it into two of " + setup.units.text(half.time.dt, "s", 6));
   State<Dim> part = before;
@@ -92,6 +92,7 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
   if (setup.time.integrator == Integrator::bdf) part.history.x.resize(1), part.history.v.resize(1);
   StepReport effort = std::move(failed.report);
   NodalForces forces;
+  ErrorFields errors;
   State<Dim> middle;
   MeshRenumbering renumbering;
   int parts = 0;
@@ -101,12 +102,17 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
     result.report.add_effort(effort);
     if (!result.ok) return result;
     effort = result.report;
+    errors = std::move(result.errors);
     forces = i == 0 ? std::move(result.forces) : mean_forces(setup, forces, middle, result.forces, part);
     if (i == 0 && setup.fields.any_forces()) middle = part;
     if (!result.renumbering.empty())
       renumbering = renumbering.empty() ? std::move(result.renumbering) : compose(renumbering, result.renumbering);
   }
-  StepResult whole{.reason = {}, .report = effort, .forces = std::move(forces), .renumbering = std::move(renumbering)};
+  StepResult whole{.reason = {},
+                   .report = effort,
+                   .forces = std::move(forces),
+                   .errors = std::move(errors),
+                   .renumbering = std::move(renumbering)};
   whole.report.cut_steps = parts;
   whole.report.step = part.step = before.step + 1;
   whole.report.t = part.t = setup.time.time_after(part.step);

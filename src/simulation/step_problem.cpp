@@ -10,6 +10,7 @@
 
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
+#include "energy/mapped.hpp"
 #include "geometry/quadratic_validity.hpp"
 #include "itr/core.hpp"
 #include "newton/curvature.hpp"
@@ -253,6 +254,62 @@ VectorX StepProblem<Dim>::total_force(const VectorX& x, const VectorX& v) {
   VectorX gradient = VectorX::Zero(x.size());
   sum.add_gradient(x, gradient, workspace_);
   return -gradient / terms_.scaling;
+}
+
+template <int Dim>
+void StepProblem<Dim>::lag_as(const StepProblem& other, const VectorX& x) {
+  terms_.contact.friction_velocity = other.terms_.contact.friction_velocity;
+  lagged_ = potential_.lag(x, workspace_);
+}
+
+template <int Dim>
+typename StepProblem<Dim>::Gradients StepProblem<Dim>::gradients(const VectorX& x) {
+  const auto of = [&](const auto& is_asked) {
+    EnergySum sum;
+    potential_.add_to(sum, lagged_, is_asked);
+    VectorX gradient = VectorX::Zero(x.size());
+    sum.add_gradient(x, gradient, workspace_);
+    return gradient;
+  };
+  const auto of_entry = [&](ForceEntry entry) { return of([=](const Traits& term) { return term.force == entry; }); };
+  return {of([](const Traits&) { return true; }), of_entry(ForceEntry::contact), of_entry(ForceEntry::friction),
+          of_entry(ForceEntry::applied)};
+}
+
+/// Pressures stay as they are where gaps shrink with d-hat: in the plain form they go with its third power.
+template <int Dim>
+typename StepProblem<Dim>::TermAt StepProblem<Dim>::contact_at(const VectorX& x, double factor) {
+  ContactOptions options = terms_.contact;
+  options.dhat *= factor;
+  const double stiffness = stiffness_.value / (options.convergent ? 1 : factor * factor * factor);
+  const auto contact = std::make_shared<ContactEnergy<Dim>>(surface_.surface, options, stiffness, terms_.scaling);
+  std::shared_ptr<const Energy> term = contact;
+  if (surface_.map) term = std::make_shared<MappedEnergy<Dim>>(contact, surface_.map);
+  Workspace workspace;  // searches of the problem's own are of its d-hat
+  TermAt at{term->value(x, workspace), VectorX::Zero(x.size())};
+  term->add_gradient(x, at.gradient, workspace);
+  return at;
+}
+
+template <int Dim>
+typename StepProblem<Dim>::TermAt StepProblem<Dim>::friction_at(const VectorX& x, double factor) {
+  TermAt at{0, VectorX::Zero(x.size())};
+  const double velocity = terms_.contact.friction_velocity;
+  terms_.contact.friction_velocity *= factor;
+  Lagged lagged;
+  potential_.lag_friction(x, workspace_, lagged);
+  terms_.contact.friction_velocity = velocity;
+  if (!lagged.friction) return at;
+  at.value = lagged.friction->value(x, workspace_);
+  lagged.friction->add_gradient(x, at.gradient, workspace_);
+  return at;
+}
+
+template <int Dim>
+SparseSystem& StepProblem<Dim>::assemble(const VectorX& x, PsdProjection psd) {
+  PrescribedMotion none;
+  system().assemble(sum(), x, psd, dofs_, none, workspace_);
+  return system();
 }
 
 template <int Dim>

@@ -101,6 +101,30 @@ class StepProblem {
   TimeErrors time_errors(const History& history, const VectorX& x, bool has_system);
   /// Elastic energies that differ by less are the same to round-off, whatever their values [J].
   double energy_resolution() const;
+
+  // For estimates of errors, all scaled.
+
+  /// Lags at x, with the velocity of friction of another problem of the same step.
+  void lag_as(const StepProblem& other, const VectorX& x);
+  /// Gradients at x of the sum, and of what is reported as contact, friction and applied forces.
+  struct Gradients {
+    VectorX all, contact, friction, applied;
+  };
+  Gradients gradients(const VectorX& x);
+  /// The sum as in the last solve, or as lagged since then.
+  EnergySum sum() const { return potential_.sum(lagged_); }
+  /// Value and gradient of a term at x.
+  struct TermAt {
+    double value = 0;
+    VectorX gradient;
+  };
+  /// Contact at x where it acts from `factor` times d-hat, with the same pressure at the same part of it.
+  TermAt contact_at(const VectorX& x, double factor);
+  /// Friction lagged at x, smoothed below `factor` times its velocity.
+  TermAt friction_at(const VectorX& x, double factor);
+  /// Assembles the Hessian of the sum at x.
+  SparseSystem& assemble(const VectorX& x, PsdProjection psd);
+  Workspace& workspace() { return workspace_; }
   const BarrierStiffness& stiffness() const { return stiffness_; }
   QuadratureLevels quadrature_levels() const { return potential_.elastic()->quadrature_levels(); }
   const DofMap& dofs() const { return dofs_; }

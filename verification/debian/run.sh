@@ -19,7 +19,7 @@ inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin "$@"; }
 log=$root/srv/quickstart.log status=0 begin=$SECONDS
 inside bash /srv/itr/examples/quickstart.sh >"$log" 2>&1 || status=$?
 {
-  echo "commit $(git -C "$source" rev-parse --short HEAD), $(date -u +%F), Debian $(cat "$root/etc/debian_version")"
+  echo "commit $(git -C "$root/srv/itr" rev-parse --short HEAD), $(date -u +%F), Debian $(cat "$root/etc/debian_version")"
   inside dpkg-query -W -f '${Package} ${Version}\n' g++ cmake libcgal-dev libeigen3-dev libfmt-dev libhdf5-dev libtbb-dev python3 || true
   echo "examples/quickstart.sh: exit status $status after $((SECONDS - begin)) s; its last lines:"
   tail -n 12 "$log"

@@ -24,6 +24,7 @@
 #include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "error_bars.hpp"
 #include "itr/core.hpp"
 #include "itr/output.hpp"
 #include "output/force_file.hpp"
@@ -235,6 +236,7 @@ template <int Dim>
 std::vector<std::string> further_files(const Setup<Dim>& setup, const RunOptions& options) {
   std::vector<std::string> names;
   if (!setup.fields.curves.empty()) names.emplace_back(output::kForceFile);
+  if (!setup.fields.points.empty()) names.emplace_back(output::kPointFile);
   if (options.profile) names.emplace_back(output::kProfileFile);
   if (options.report) names.emplace_back(kReportFile);
   return names;
@@ -261,6 +263,7 @@ class Run {
         with_report_(options.report),
         writes_beside_(threads > 1),
         warnings_(warnings),
+        units_(scene.output.units),
         simulation_(std::move(setup), registry, make_logger(warnings)) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(),
@@ -311,6 +314,10 @@ class Run {
       fmt::print("{}\n", describe_steps(writer_->totals(), setup.time.adaptive));
     if (is_finished && setup.remesh.enabled)
       fmt::print("{}\n", describe_remeshing(writer_->totals(), setup.units, setup.mesh.num_vertices()));
+    if (is_finished && setup.fields.error_bars)
+      for (const std::string& line :
+           describe_errors(setup.fields.curves.empty() ? "" : output::stored_forces(directory_), writer_->totals(), units_))
+        fmt::print("{}\n", line);
     if (const int count = writer_->warnings(); count > 0)
       spdlog::warn("{} warning{}: see above, or summary.json in {}", count, count == 1 ? "" : "s", directory_);
     if (with_report_) write_report();
@@ -472,6 +479,7 @@ class Run {
   std::string directory_;
   bool with_report_, writes_beside_;
   Warnings& warnings_;
+  Units units_;  ///< of results
   Simulation<Dim> simulation_;
   std::unique_ptr<output::Writer> writer_;
   std::optional<output::ProfileFile> profile_;

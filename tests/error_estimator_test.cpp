@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+// Error bars: what they add to energies, forces and displacements is what a finer space, a smaller d-hat or more iterations
+// give.
+#include "simulation/error_estimator.hpp"
+
+#include <gtest/gtest.h>
+
+#include "itr/simulation.hpp"
+#include "itr/solver.hpp"
+#include "mesh/refine.hpp"
+#include "simulation_scenes.hpp"
+
+namespace itr {
+namespace {
+
+constexpr double kSize = 0.2;
+constexpr int kMesh = static_cast<int>(ErrorSource::mesh), kDhat = static_cast<int>(ErrorSource::dhat),
+              kSolver = static_cast<int>(ErrorSource::solver);
+
+/// A square held on the left and moved on the right, without inertia.
+itr::Setup<2> pulled(MaterialLaw law, const Vec<2>& motion) {
+  itr::Setup<2> setup;
+  setup.mesh = make_square(4, kSize);
+  setup.materials[1] = {.law = law, .youngs_modulus = 1e4, .poisson_ratio = 0.3, .density = 1000};
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  setup.newton.step_tolerance = 1e-13;
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 0;
+  setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }},
+                     {3, {true, true}, [motion](const Vec<2>&, double) { return motion; }}};
+  setup.fields.reaction_forces = setup.fields.contact_forces = true;
+  setup.fields.curves = {{.name = "right", .surfaces = {3}}};
+  setup.fields.points = {{.name = "corner", .rest = {kSize / 2, kSize, 0}}};
+  setup.fields.error_bars = true;
+  return setup;
+}
+
+/// Results of one step.
+struct Outcome {
+  double energy = 0;
+  Vec<2> force, point;
+  ErrorReport errors;
+  ForceCurvePoint curve;
+  PointValue at_point;
+};
+
+Outcome run(const itr::Setup<2>& setup) {
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const StepResult result = simulation.advance();
+  EXPECT_TRUE(result.ok) << result.reason;
+  Outcome outcome;
+  outcome.energy = result.report.energy.total;
+  outcome.errors = result.report.errors;
+  simulation.observe([&](const FrameView<2>& frame) {
+    outcome.curve = frame.asked->curves.at(0);
+    outcome.at_point = frame.asked->points.at(0);
+  });
+  outcome.force = Vec<2>(outcome.curve.kinds[3].data());
+  outcome.point = Vec<2>(outcome.at_point.u.data());
+  EXPECT_EQ(outcome.errors.no_bar, "");
+  return outcome;
+}
+
+/// Expects that what the bars of the mesh add to `rough` leads to `fine`. Iterations end where they add a thousandth of the
+/// energy's error: motions are known to the root of that, locally to a few times as much.
+void expect_leads_to(const Outcome& rough, const Outcome& fine) {
+  constexpr double kEnergy = 0.01, kForce = 0.1, kPoint = 0.25;
+  const double energy = fine.energy - rough.energy;
+  EXPECT_NEAR(rough.errors.energy[kMesh], energy, kEnergy * std::abs(energy));
+  const Vec<2> force = fine.force - rough.force, point = fine.point - rough.point;
+  EXPECT_LE((Vec<2>(rough.curve.errors.at(kMesh)[3].data()) - force).norm(), kForce * force.norm());
+  EXPECT_LE((Vec<2>(rough.at_point.errors.at(kMesh).data()) - point).norm(), kPoint * point.norm());
+}
+
+TEST(ErrorEstimator, FindsWhatQuadraticElementsGainOnALinearProblem) {
+  itr::Setup<2> setup = pulled(MaterialLaw::linear, {0.01, 0.005});
+  const Outcome linear = run(setup);
+  setup.order = {{1, 2}};
+  const Outcome quadratic = run(setup);
+  EXPECT_LT(quadratic.energy, 0.99 * linear.energy);
+  expect_leads_to(linear, quadratic);
+}
+
+TEST(ErrorEstimator, FindsWhatRefinedQuadraticElementsGainOnALinearProblem) {
+  itr::Setup<2> setup = pulled(MaterialLaw::linear, {0.01, 0.005});
+  setup.order = {{1, 2}};
+  const Outcome rough = run(setup);
+  setup.mesh = refine_uniformly(setup.mesh);
+  const Outcome fine = run(setup);
+  expect_leads_to(rough, fine);
+}
+
+TEST(ErrorEstimator, FindsNothingWhereTheSolutionIsInTheSpace) {
+  for (const int order : {1, 2}) {
+    itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {});
+    setup.order = {{1, order}};
+    setup.dirichlet.clear();
+    for (const int side : {1, 2, 3, 4})
+      setup.dirichlet.push_back(
+          {side, {true, true}, [](const Vec<2>& X, double) { return Vec<2>(0.1 * X[0] + 0.05 * X[1], -0.02 * X[0]); }});
+    const Outcome outcome = run(setup);
+    for (int s = 0; s < kErrorSources; ++s) {
+      EXPECT_LE(std::abs(outcome.errors.energy[s]), 1e-13 * outcome.energy) << order << ' ' << s;
+      EXPECT_LE(Vec<2>(outcome.curve.errors.at(s)[3].data()).norm(), 1e-7 * outcome.force.norm()) << order << ' ' << s;
+      EXPECT_LE(Vec<2>(outcome.at_point.errors.at(s).data()).norm(), 1e-9 * kSize) << order << ' ' << s;
+    }
+  }
+}
+
+/// A square that an obstacle presses onto another one.
+itr::Setup<2> pressed(double dhat) {
+  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {});
+  setup.dirichlet.resize(1);
+  setup.dirichlet[0].tag = 2;
+  setup.obstacles.rest = {{-0.1, kSize + 1e-3}, {0.13, kSize + 1e-3}};
+  setup.obstacles.edges = {{0, 1}};
+  setup.obstacles.motion = {0, 0};
+  setup.obstacles.motions = {[](const Vec<2>&, double t) { return Vec<2>(0, -0.011 * t); }};
+  setup.contact = {.enabled = true, .dhat = dhat, .convergent = true, .barrier_stiffness = 1e4};
+  setup.fields.curves = {{.name = "plate", .obstacle_vertices = {0, 1}}};
+  return setup;
+}
+
+/// The finite difference of the adjoint's theory: forces by another d-hat are those that the derivative promises.
+TEST(ErrorEstimator, HasTheDerivativeByDhat) {
+  constexpr double kDhat0 = 4e-4, kChange = 1e-3;
+  const Outcome here = run(pressed(kDhat0)), nearer = run(pressed((1 - kChange) * kDhat0));
+  const double energy = (nearer.energy - here.energy) / kChange;
+  EXPECT_NEAR(here.errors.energy[kDhat], energy, 0.01 * std::abs(energy));
+  const Vec<2> force = (nearer.force - here.force) / kChange;
+  EXPECT_NEAR(here.curve.errors.at(kDhat)[3][1], force[1], 0.02 * std::abs(force[1]));
+  EXPECT_LT(here.errors.energy[kDhat], 0);  // a bias of known sign
+}
+
+TEST(ErrorEstimator, FindsWhatTheSolverLeft) {
+  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {0.04, 0.02});
+  const Outcome exact = run(setup);
+  setup.newton.step_tolerance = 1e-2;
+  setup.newton.force_tolerance = 0;
+  const Outcome loose = run(setup);
+  ASSERT_GT((loose.point - exact.point).norm(), 1e-9);
+  const Vec<2> point = exact.point - loose.point;
+  EXPECT_LE((Vec<2>(loose.at_point.errors.at(kSolver).data()) - point).norm(), 0.2 * point.norm());
+}
+
+TEST(ErrorEstimator, SaysWhyThereIsNoBar) {
+  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {0.01, 0});
+  setup.lump_mass = true;
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const StepResult result = simulation.advance();
+  ASSERT_TRUE(result.ok);
+  EXPECT_EQ(result.report.errors.no_bar, "the mass is lumped");
+  EXPECT_TRUE(result.errors.sources.empty());
+}
+
+TEST(ErrorEstimator, ChangesNoResult) {
+  itr::Setup<2> setup = pressed(4e-4);
+  const Outcome with = run(setup);
+  setup.fields.error_bars = false;
+  const Outcome without = run(setup);
+  EXPECT_EQ(with.energy, without.energy);
+  EXPECT_EQ(with.force, without.force);
+  EXPECT_FALSE(without.errors.is_asked);
+  EXPECT_TRUE(without.curve.errors.empty());
+}
+
+}  // namespace
+}  // namespace itr
