@@ -91,6 +91,13 @@ class Runs(unittest.TestCase):
         self.assertEqual(results("whole"), results("cut"))
         self.assertGreater(len(frames), 20)
 
+    def test_free_fall_has_its_height_with_each_integrator(self):
+        """No spring tells the error of a body that falls: the work of its weight does."""
+        for integrator in ("ImplicitEuler", "ImplicitNewmark", "BDF2"):
+            self.run_drop(integrator, {"tend": 0.1, "integrator": integrator, "tolerance": 0.1})
+            fallen = json.loads((self.folder / integrator / "summary.json").read_text())["norms"]["linf"]
+            self.assertAlmostEqual(fallen / (9.81 / 2 * 0.1**2), 1, delta=0.05, msg=integrator)
+
     def test_what_goes_with_dt_auto_alone_is_refused_without(self):
         for key in ("tolerance", "dt_min", "dt_max", "output_dt"):
             done = self.run_drop("refused", {"dt": 0.01, "tolerance": None, key: 0.1}, status=2)

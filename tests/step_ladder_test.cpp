@@ -88,6 +88,8 @@ TEST(StepLadder, TakesAnAdaptiveStepAgainFromTheTopAndShorter) {
   }
   EXPECT_EQ(ladder.next(top, kInverted), (Attempt{.straightening = kAround, .trial = inaccurate.trial}));
   EXPECT_EQ(ladder.next(top, kRemeshed), (Attempt{.remeshing = kNoRemeshing, .trial = inaccurate.trial}));
+  const Attempt short_one{.trial = {.length = 0.09, .part = 0.25}};
+  EXPECT_EQ(ladder.next(short_one, kCreates), (Attempt{.method = implicit_euler, .trial = short_one.trial}));
   // As short as it may be: implicit Euler takes what would create energy.
   EXPECT_FALSE(at_least.next(top, kUnsolved));
   EXPECT_EQ(at_least.next(top, kCreates), (Attempt{.method = implicit_euler, .trial = inaccurate.trial}));

@@ -5,6 +5,7 @@ namespace itr {
 
 namespace {
 
+constexpr double kShortest = 0.1;  ///< part of its first length from which implicit Euler takes what would create energy
 constexpr double kShorter = 0.25;  ///< part that is tried next where an adaptive step has no solution
 
 /// The top of the ladder of a step of this length.
@@ -30,7 +31,7 @@ std::optional<Attempt> StepLadder::next(const Attempt& attempt, const StepFailur
     case StepFailure::Kind::inaccurate:
       return shortened(failure.trial);
     case StepFailure::Kind::creates_energy:
-      if (least_part <= kShorter) break;
+      if (least_part <= kShorter && attempt.trial.length > kShortest) break;
       if (attempt.method == StepMethod::implicit_euler) break;
       next.method = StepMethod::implicit_euler;
       next.remeshing = Remeshing::with_new_curves;

@@ -9,9 +9,11 @@
 //    the step begins again at 1: around these cells, then everywhere, then everywhere at any volume of the new cells.
 // 5. If the scene allows cuts, two steps of half the length go down their own ladder, by implicit Euler.
 //
-// An adaptive step is taken again from the top, and shorter, where its errors in time are too large, and in place of 3
-// and 5. A cancelled step has no next attempt. Rounds of lagging and retries of Newton's method are inside of one solve, and
-// larger flat obstacles (flat_obstacles.hpp) are around the whole ladder.
+// An adaptive step is taken again from the top, and shorter, where its errors in time are too large, in place of 5, and
+// before 3.
+//
+// A cancelled step has no next attempt. Rounds of lagging and retries of Newton's method are inside of one solve, and larger
+// flat obstacles (flat_obstacles.hpp) are around the whole ladder.
 #pragma once
 
 #include <optional>

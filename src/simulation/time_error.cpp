@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Errors in time of a step that is solved (docs/theory.md, "Adaptive time").
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "energy/incremental_potential.hpp"
@@ -12,7 +13,8 @@ namespace itr {
 /// step, such as that of a barrier, is damped anyway. Forces M e on nodes that contact acts on at either end jump with it,
 /// and are left out: find_impact judges these jumps by their energy.
 template <int Dim>
-double StepProblem<Dim>::local_error_energy(const History& history, const VectorX& increment, const VectorX& contact) {
+void StepProblem<Dim>::find_local_error(const History& history, const VectorX& increment, const VectorX& contact,
+                                        TimeErrors& errors) {
   const TimeIntegrator integrator(setup_.time);
   const int unknowns = dofs_.num_unknowns;
   const auto of_unknowns = [&](const VectorX& field) {
@@ -32,7 +34,8 @@ double StepProblem<Dim>::local_error_energy(const History& history, const Vector
     const VectorX d = of_unknowns((increment - h * history.v[0]) / chord);
     VectorX force(unknowns);
     system().product()(d, force);
-    return 0.5 * std::max(0.0, d.dot(force)) / terms_.scaling;
+    errors.local = 0.5 * std::max(0.0, d.dot(force)) / terms_.scaling;
+    return;
   }
   const LocalError error = integrator.local_error(increment, history);
   const auto filtered = [&](const VectorX& e) {
@@ -46,10 +49,15 @@ double StepProblem<Dim>::local_error_energy(const History& history, const Vector
     return is_solved ? std::pair(force, f) : std::pair(force, of_unknowns(e));
   };
   const auto [force, f] = filtered(error.x);
-  double energy = f.dot(force - mass_product(f)) / (2 * terms_.scaling);
-  if (error.v.size() == 0) return std::max(0.0, energy);
+  errors.local = std::max(0.0, f.dot(force - mass_product(f)) / (2 * terms_.scaling));
+  VectorX loads = VectorX::Zero(increment.size());
+  EnergySum sum;
+  potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::loads; });
+  sum.add_gradient(base_ + increment, loads, workspace_);
+  errors.work = std::abs(f.dot(of_unknowns(loads))) / terms_.scaling;
+  if (error.v.size() == 0) return;
   const VectorX f_v = filtered(error.v).second;
-  return std::max(0.0, energy) + 0.5 * f_v.dot(mass_product(f_v));
+  errors.local += 0.5 * f_v.dot(mass_product(f_v));
 }
 
 template <int Dim>
@@ -101,14 +109,14 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
     contact = contact_gradient(x).cwiseAbs();
     for (const VectorX& past : history.x) contact += contact_gradient(past).cwiseAbs();
   }
-  errors.local = local_error_energy(history, increment, contact);
+  find_local_error(history, increment, contact, errors);
   if (terms_.has_inertia && potential_.contact()) find_impact(history, x, v, errors);
   return errors;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                \
-  template double StepProblem<Dim>::local_error_energy(const History&, const VectorX&, const VectorX&);     \
-  template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, TimeErrors&); \
+#define ITR_INSTANTIATE(Dim)                                                                                     \
+  template void StepProblem<Dim>::find_local_error(const History&, const VectorX&, const VectorX&, TimeErrors&); \
+  template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, TimeErrors&);      \
   template TimeErrors StepProblem<Dim>::time_errors(const History&, const VectorX&, bool);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
