@@ -28,16 +28,16 @@ Setup<2> swinging_square() {
   return setup;
 }
 
-struct Run {
+struct Outcome {
   VectorX x, v;
   int steps = 0, rejected = 0;
   double error = 0;  ///< the estimates of all steps
   std::vector<double> times;
 };
-Run run(Setup<2> setup) {
+Outcome run(Setup<2> setup) {
   linear::Registry registry;
   Simulation<2> simulation(std::move(setup), registry);
-  Run run;
+  Outcome run;
   while (!simulation.finished()) {
     const StepResult result = simulation.advance();
     EXPECT_TRUE(result.ok) << result.reason;
@@ -57,7 +57,7 @@ TEST(AdaptiveTime, ErrorFollowsTheToleranceAndTheEstimate) {
   constexpr double kEnd = 0.1;  // about two periods of the slowest swing
   auto reference = swinging_square();
   reference.time = {.integrator = Integrator::bdf, .dt = kEnd / 8000, .steps = 8000};
-  const Run exact = run(reference);
+  const Outcome exact = run(reference);
   const double amplitude = (exact.x - run([] {
                                         auto setup = swinging_square();
                                         setup.time = {.integrator = Integrator::bdf, .dt = 1e-9, .steps = 1};
@@ -69,7 +69,7 @@ TEST(AdaptiveTime, ErrorFollowsTheToleranceAndTheEstimate) {
   for (const double tolerance : {0.08, 0.02, 0.005}) {
     auto setup = swinging_square();
     make_adaptive(setup, Integrator::bdf, tolerance, kEnd);
-    const Run adaptive = run(setup);
+    const Outcome adaptive = run(setup);
     const double error = (adaptive.x - exact.x).norm() / amplitude;
     EXPECT_EQ(adaptive.times.back(), kEnd);
     EXPECT_LT(error, 3 * adaptive.error) << "at " << tolerance << " by " << adaptive.steps << " steps";
@@ -135,7 +135,7 @@ TEST(AdaptiveTime, EndsStepsAtKinksAndAtAskedTimes) {
   make_adaptive(setup, Integrator::newmark, 0.05, 0.1);
   setup.time.adaptive.output_dt = 0.03;
   setup.time.adaptive.kinks = {0.0123, 0.05};
-  const Run found = run(setup);
+  const Outcome found = run(setup);
   const std::set<double> times(found.times.begin(), found.times.end());
   for (const double t : {0.0123, 0.05, 1 * 0.03, 2 * 0.03, 3 * 0.03, 0.1}) EXPECT_TRUE(times.count(t)) << t;
 }

@@ -262,13 +262,14 @@ TEST(StepController, RejectsWhatIsTooLongAndGivesUpAtJumps) {
   EXPECT_FALSE(controller.shorter({.error = allowed}, {}, 1, 2));
   const auto once = controller.shorter({.error = 8 * allowed}, {}, 1, 2);
   ASSERT_TRUE(once);
-  EXPECT_NEAR(once->part, 0.45, 1e-12);
+  EXPECT_NEAR(once->part, 0.475, 1e-12);
   EXPECT_EQ(once->error, 8);
   // A smooth motion's error falls by the third power of the length, a jump's hardly.
-  EXPECT_EQ(controller.shorter({.error = 2 * allowed}, *once, 0.45, 2)->jumps, 0);
-  const auto twice = controller.shorter({.error = 7 * allowed}, *once, 0.45, 2);
+  EXPECT_EQ(controller.shorter({.error = 2.5 * allowed}, *once, 0.475, 2)->jumps, 0);
+  const auto twice = controller.shorter({.error = 7 * allowed}, *once, 0.475, 2);
   ASSERT_TRUE(twice);
   EXPECT_EQ(twice->jumps, 1);
+  EXPECT_EQ(twice->part, 0.4);
   EXPECT_NEAR(twice->length, once->part * twice->part, 1e-15);
   EXPECT_FALSE(controller.shorter({.error = 6 * allowed}, *twice, 0.2, 2));
   TimeOptions bounded = time;

@@ -276,7 +276,7 @@ class StepSolver {
     const TimeErrors found = problem_->time_errors(next_.history, x_, first_summary_.iterations > 0);
     energy_ = found.energy;
     const double largest = std::max({before_.control.energy, energy_, problem_->energy_resolution()});
-    errors_ = {.error = std::isfinite(found.local) ? std::sqrt(found.local / largest) : 0,
+    errors_ = {.error = std::sqrt(found.local / largest),
                .impact = found.impact / largest,
                .resolving_dt = found.resolving_dt,
                .way_to_contact = found.way_to_contact};

@@ -52,7 +52,7 @@ class LaggedSolve;
 
 /// Errors in time of a step that is solved.
 struct TimeErrors {
-  double local = 0;           ///< energy of its local error [J]; not finite where no solver could tell
+  double local = 0;           ///< energy of its local error [J]
   double energy = 0;          ///< kinetic, elastic and contact energy at its end [J]
   double impact = 0;          ///< kinetic energy that nodes lost as they came into contact [J]
   double resolving_dt = 0;    ///< which resolves how contact stops these nodes [s]
@@ -115,7 +115,8 @@ class StepProblem {
   using Traits = TermTraits<Dim>;
   void initialize_stiffness(const VectorX& x);
   void smooth_friction_by(double motion);
-  double local_error_energy(const History& history, const VectorX& increment);
+  double local_error_energy(const History& history, const VectorX& increment, const VectorX& contact);
+  VectorX contact_gradient(const VectorX& x);
   void find_impact(const History& history, const VectorX& x, const VectorX& v, TimeErrors& errors);
   void reset_system();
   SparseSystem& system();

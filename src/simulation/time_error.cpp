@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Errors in time of a step that is solved (docs/theory.md, "Adaptive time").
 #include <algorithm>
-#include <limits>
+#include <utility>
 
 #include "energy/incremental_potential.hpp"
 #include "simulation/step_problem.hpp"
@@ -9,9 +9,10 @@
 namespace itr {
 
 /// Energy of an error e in time once the step has filtered it, (M + alpha h^2 K) f = M e: motion that is faster than a
-/// step, such as that of a barrier, is damped anyway.
+/// step, such as that of a barrier, is damped anyway. Forces M e on nodes that contact acts on at either end jump with it,
+/// and are left out: find_impact judges these jumps by their energy.
 template <int Dim>
-double StepProblem<Dim>::local_error_energy(const History& history, const VectorX& increment) {
+double StepProblem<Dim>::local_error_energy(const History& history, const VectorX& increment, const VectorX& contact) {
   const TimeIntegrator integrator(setup_.time);
   const int unknowns = dofs_.num_unknowns;
   const auto of_unknowns = [&](const VectorX& field) {
@@ -34,23 +35,36 @@ double StepProblem<Dim>::local_error_energy(const History& history, const Vector
     return 0.5 * std::max(0.0, d.dot(force)) / terms_.scaling;
   }
   const LocalError error = integrator.local_error(increment, history);
-  const bool has_velocity = error.v.size() > 0;
-  MatrixX B(unknowns, has_velocity ? 2 : 1), filtered;
-  B.col(0) = mass_product(of_unknowns(error.x));
-  if (has_velocity) B.col(1) = mass_product(of_unknowns(error.v));
-  if (!system().solve_columns(B, filtered)) return std::numeric_limits<double>::quiet_NaN();
-  double energy = std::max(0.0, filtered.col(0).dot(B.col(0) - mass_product(filtered.col(0)))) / (2 * terms_.scaling);
-  if (has_velocity) energy += 0.5 * filtered.col(1).dot(mass_product(filtered.col(1)));
-  return energy;
+  const auto filtered = [&](const VectorX& e) {
+    constexpr double kDigits = 1e-3;
+    VectorX force = mass_product(of_unknowns(e)), f(unknowns);
+    for (Eigen::Index i = 0; i < contact.size(); ++i)
+      if (contact[i] != 0 && dofs_.unknown[i] != kNone) force[dofs_.unknown[i]] = 0;
+    linear::Asked asked{.residual = kDigits};
+    asked.if_indefinite = true;
+    const bool is_solved = system().solve(0, force, asked, f).outcome == linear::Outcome::ok && f.allFinite();
+    return is_solved ? std::pair(force, f) : std::pair(force, of_unknowns(e));
+  };
+  const auto [force, f] = filtered(error.x);
+  double energy = f.dot(force - mass_product(f)) / (2 * terms_.scaling);
+  if (error.v.size() == 0) return std::max(0.0, energy);
+  const VectorX f_v = filtered(error.v).second;
+  return std::max(0.0, energy) + 0.5 * f_v.dot(mass_product(f_v));
+}
+
+template <int Dim>
+VectorX StepProblem<Dim>::contact_gradient(const VectorX& x) {
+  VectorX gradient = VectorX::Zero(x.size());
+  potential_.contact_of_cells()->add_gradient(x, gradient, workspace_);
+  return gradient;
 }
 
 /// Nodes that no contact force acted on before the step, and that one has stopped in its direction.
 template <int Dim>
 void StepProblem<Dim>::find_impact(const History& history, const VectorX& x, const VectorX& v, TimeErrors& errors) {
   const VectorX &x0 = history.x[0], &v0 = history.v[0];
-  VectorX before = VectorX::Zero(x.size()), now = before, stopped = before;
-  potential_.contact_of_cells()->add_gradient(x, now, workspace_);
-  potential_.contact_of_cells()->add_gradient(x0, before, workspace_);
+  const VectorX before = contact_gradient(x0), now = contact_gradient(x);
+  VectorX stopped = VectorX::Zero(x.size());
   double fastest = 0;
   for (Eigen::Index i = 0; i < x.size(); i += Dim) {
     const Vec<Dim> force = -now.template segment<Dim>(i);
@@ -81,15 +95,19 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
   if (!has_system) {
     PrescribedMotion none;
     system().assemble(potential_.sum(lagged_), x, PsdProjection::clamp, dofs_, none, workspace_);
-    system().factorize(0);
   }
-  errors.local = local_error_energy(history, increment);
+  VectorX contact;  // not 0 on nodes that it acts on
+  if (terms_.has_inertia && potential_.contact()) {
+    contact = contact_gradient(x).cwiseAbs();
+    for (const VectorX& past : history.x) contact += contact_gradient(past).cwiseAbs();
+  }
+  errors.local = local_error_energy(history, increment, contact);
   if (terms_.has_inertia && potential_.contact()) find_impact(history, x, v, errors);
   return errors;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                \
-  template double StepProblem<Dim>::local_error_energy(const History&, const VectorX&);                     \
+  template double StepProblem<Dim>::local_error_energy(const History&, const VectorX&, const VectorX&);     \
   template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, TimeErrors&); \
   template TimeErrors StepProblem<Dim>::time_errors(const History&, const VectorX&, bool);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

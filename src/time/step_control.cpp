@@ -10,9 +10,10 @@ namespace itr {
 
 namespace {
 
-constexpr double kReject = 1.5;     ///< of the error that is allowed
-constexpr double kSafety = 0.9;     ///< of the length that would make the error just that
+constexpr double kReject = 2;       ///< of the error that is allowed
+constexpr double kSafety = 0.95;    ///< of the length that would make the error just that
 constexpr double kShrink = 0.2;     ///< the most at once
+constexpr double kShorter = 0.4;    ///< at a jump at least
 constexpr double kNear = 1e-9;      ///< of the run: stops so near are the same
 constexpr int kMostJumps = 2;       ///< in a row: what is left is a jump of velocities, which no length resolves
 constexpr double kJumpOrder = 0.5;  ///< of the error's order in h, by that of a smooth motion
@@ -61,7 +62,8 @@ std::optional<StepTrial> StepController::shorter(const StepErrors& errors, const
   const double order = exponent(accuracy);
   const bool fell_less = trial.error > 0 && error > trial.error * std::pow(trial.part, kJumpOrder * order);
   if (fell_less && trial.jumps + 1 >= kMostJumps) return std::nullopt;
-  StepTrial next = trial.shortened(std::clamp(kSafety * std::pow(error, -1 / order), least, kSafety));
+  const double fitting = kSafety * std::pow(error, -1 / order);
+  StepTrial next = trial.shortened(std::clamp(fell_less ? std::min(fitting, kShorter) : fitting, least, kSafety));
   next.error = error;
   next.jumps = fell_less ? trial.jumps + 1 : 0;
   return next;
@@ -69,7 +71,7 @@ std::optional<StepTrial> StepController::shorter(const StepErrors& errors, const
 
 StepControl StepController::after(const StepControl& before, const StepErrors& errors, const StepTrial& trial, double dt,
                                   double energy) const {
-  constexpr double kLeastGrowth = 1.25;  // less keeps the length, and with it the factor
+  constexpr double kLeastGrowth = 1.15;  // less keeps the length, and with it the factor
   const double order = exponent(order_), error = errors.error / allowed_;
   const bool was_shortened = trial.length < 1;
   const auto fitting = [&](double e) { return e > 0 ? kSafety * std::pow(e, -1 / order) : kGrowth; };

@@ -70,9 +70,9 @@ def cases(folder, scenes):
     off = ["/space/remesh/enabled=false"]
     return {
         "ball-wall": Case(scenes / "ball-wall/2D.json", 0.012, (200, 400, 800, 1600, 3200), (0.3, 0.1, 0.03), 12800, off),
-        "drop": Case(ROOT / "examples/tasks/drop.json", 0.5, (100, 200, 400, 800, 1600), (0.3, 0.1, 0.03), 6400, off),
-        "hook": Case(hook(folder), 2, (30, 60, 120, 240, 480), (0.1, 0.03, 0.01), 1920, quasistatic=True),
-        "masticator": Case(scenes / "masticator/h=0.1-noremesh.json", 3, (60, 120, 240, 480), (0.3, 0.1, 0.03), 1920,
+        "drop": Case(ROOT / "examples/tasks/drop.json", 0.5, (100, 200, 400, 800, 1600, 3200), (0.3, 0.1, 0.03, 0.01), 12800, off),
+        "hook": Case(hook(folder), 2, (30, 60, 120, 240, 480, 960, 1920), (0.3, 0.1, 0.03, 0.01), 15360, quasistatic=True),
+        "masticator": Case(scenes / "masticator/h=0.1-noremesh.json", 3, (60, 120, 240, 480, 960), (0.3, 0.1, 0.03), 3840,
                            ["/solver/contact/friction_iterations=30"]),
     }
 
