@@ -56,7 +56,7 @@ struct AssemblyTree {
 
 /// Contributions are stored by blocks of columns, without what is above a block: half of the square.
 struct Contribution {
-  static constexpr int kBlock = 256;
+  static constexpr int kBlock = 128;
   double* values = nullptr;
   int order = 0;
 

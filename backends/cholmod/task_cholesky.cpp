@@ -16,9 +16,10 @@ namespace {
 
 // The cut of the work, in the costs of AssemblyTree.
 constexpr double kPieces = 96;       ///< about so many, where they are large enough
-constexpr double kLeastPiece = 1e7;  ///< a tenth of a millisecond
-constexpr double kTiledFrom = 6e7;   ///< cost of a front that is cut into tiles
-constexpr int kPanel = 128;          ///< columns of a tile
+constexpr double kLeastPiece = 4e6;  ///< a tenth of a millisecond
+constexpr double kLong = 2e7;        ///< cost of a factorisation from which several threads share it
+constexpr double kTiledFrom = 1e7;   ///< cost of a front that is cut into tiles
+constexpr int kPanel = 64;           ///< columns of a tile
 
 constexpr std::size_t round_up(std::size_t size) { return (size + 7) / 8 * 8; }
 
@@ -40,6 +41,7 @@ bool TaskCholesky::analyze(const SupernodalPattern& pattern) {
   if (!tree_.assign(pattern)) return false;
   double total = 0;
   for (int s = 0; s < tree_.size; ++s) total += tree_.cost(s);
+  is_short_ = total < kLong;
   cut_ = TreeCut(tree_, std::max(kLeastPiece, total / kPieces));
   if (factor_.size() < factor_size() || factor_.size() > 2 * factor_size()) {
     factor_ = {};
@@ -154,7 +156,7 @@ int TaskCholesky::factorize(const double* values, std::span<const int> sources) 
     for (int s = 0; s < tree_.size; ++s) release(s);
   };
   try {
-    factor_graph_.graph.run([&](int task) { run(factor_graph_.tasks[task]); });
+    factor_graph_.graph.run([&](int task) { run(factor_graph_.tasks[task]); }, is_short_);
   } catch (...) {
     release_all();
     throw;

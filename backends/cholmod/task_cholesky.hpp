@@ -151,7 +151,7 @@ class TaskCholesky {
   std::vector<char> parity_;             ///< of a front's depth in its piece
   std::size_t stack_sizes_[2] = {0, 0};  ///< that any piece needs
   Graph factor_graph_, forward_graph_, backward_graph_;
-  bool solves_by_tasks_ = false;
+  bool is_short_ = true, solves_are_short_ = true;  ///< too short for several threads
   std::vector<std::size_t> updates_;  ///< where the update of a solution by a piece's root or a front above begins
 
   Doubles factor_;

@@ -28,9 +28,10 @@ class TaskGraph {
   void clear() { *this = {}; }
   int size() const { return static_cast<int>(costs_.size()); }
 
-  /// Calls `work` with each task's number, in their order on one thread, else as soon as what they wait for is done. Work
-  /// that writes where no other task does that may run at the same time has the same results on any number of threads.
-  void run(const std::function<void(int)>& work);
+  /// Calls `work` with each task's number, in their order on one thread or where `is_short`, so that it is not worth to wake
+  /// others, else as soon as what they wait for is done. Work that writes where no other task does that may run at the same
+  /// time has the same results on any number of threads.
+  void run(const std::function<void(int)>& work, bool is_short);
   /// Seconds of the last run, by the clock.
   const TaskTimes& times() const { return times_; }
 

@@ -9,10 +9,10 @@ namespace itr::backends {
 
 namespace {
 
-constexpr int kRows = 2048;                    ///< of a task of a forward solve
-constexpr int kColumns = 64;                   ///< of a task of a backward solve
-constexpr std::size_t kTiledFrom = 1 << 16;    ///< entries of a panel
-constexpr std::size_t kByTasksFrom = 1 << 18;  ///< entries of a factor
+constexpr int kRows = 2048;                  ///< of a task of a forward solve
+constexpr int kColumns = 64;                 ///< of a task of a backward solve
+constexpr std::size_t kTiledFrom = 1 << 16;  ///< entries of a panel
+constexpr std::size_t kLong = 1 << 18;       ///< entries of a factor whose solve several threads share
 
 struct Part {
   int begin, end;
@@ -61,7 +61,7 @@ void TaskCholesky::plan_solves() {
   updates_.assign(tree_.size + 1, 0);
   for (int s = 0; s < tree_.size; ++s)
     updates_[s + 1] = updates_[s] + (cut_.is_above[s] || cut_.is_root(tree_, s) ? tree_.below(s) : 0);
-  solves_by_tasks_ = factor_size() > kByTasksFrom;
+  solves_are_short_ = factor_size() < kLong;
   plan_forward();
   plan_backward();
 }
@@ -126,11 +126,7 @@ void TaskCholesky::solve(const double* rhs, double* solution, int columns, const
   for (const bool forward : {true, false}) {
     Graph& graph = forward ? forward_graph_ : backward_graph_;
     const auto work = [&](int task) { now.run(graph.tasks[task], forward); };
-    if (!solves_by_tasks_) {
-      for (int task = 0; task < graph.graph.size(); ++task) work(task);
-      continue;
-    }
-    graph.graph.run(work);
+    graph.graph.run(work, solves_are_short_);
     const TaskTimes& times = graph.graph.times();
     times_ = {times_.wall + times.wall, times_.work + times.work, times_.span + times.span};
   }
