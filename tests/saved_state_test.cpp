@@ -258,5 +258,90 @@ TEST_F(SavedStateTest, FramesWithoutAReadableStateAreRefusedAndKept) {
   EXPECT_EQ(results_of(run), lines);
 }
 
+/// Results that itr 0.1 (928a048, `tests/states_0.1/scene.json`) stored after five steps.
+class ResultsOf01 : public SavedStateTest {
+ protected:
+  Command go_on(const std::string& name, const Arguments& more = {}) const {
+    fs::copy(data / name, folder / name, fs::copy_options::recursive);
+    return run(name, more, {"--resume"});
+  }
+  Command run(const std::string& name, const Arguments& sets, const Arguments& options) const {
+    Arguments words = {(data / "scene.json").string(), "-o", (folder / name).string(), "--threads", "1"};
+    words.insert(words.end(), options.begin(), options.end());
+    for (const std::string& set : sets) words.insert(words.end(), {"--set", set});
+    words.insert(words.end(), {"--set", "/time/time_steps=8"});
+    return start(words);
+  }
+  Command itr(const Arguments& command) const { return Command({}, folder / "log", 0, command); }
+
+  const fs::path data = fs::path(ITR_SOURCE_DIR) / "tests/states_0.1";
+};
+
+TEST_F(ResultsOf01, HaveStatesThatAreRead) {
+  for (const std::string name : {"fixed", "remeshed"}) {
+    const auto saved = find_saved_state(data / name);
+    ASSERT_TRUE(saved.has_value()) << name;
+    EXPECT_EQ(scene::defaults_of(saved->scene), "itr-0");
+    const auto checkpoint = read_checkpoint<2>(*saved);
+    const State<2>& state = *checkpoint.state;
+    const StoredFrame frame = read_frame(saved->file);
+    EXPECT_EQ(state.step, 5);
+    EXPECT_EQ(std::vector<double>(state.history.x[0].begin(), state.history.x[0].end()), frame.x);
+    EXPECT_EQ(state.remesh_memory.refusals.empty(), name == "fixed");
+    EXPECT_EQ(state.strata.empty(), name == "fixed");
+    const Json totals = Json::parse(checkpoint.totals), summary = Json::parse(text_of(data / name / "summary.json"));
+    for (const char* field : {"vertices", "newton_iterations", "min_distance", "history_loss"})
+      EXPECT_EQ(totals.at(field), summary.at(field)) << field;
+    for (const auto& [term, energy] : summary.at("energy").items()) EXPECT_EQ(totals.at("energy").at(term), energy) << term;
+    for (const char* field : {"splits", "collapses"})
+      for (const auto& [reason, count] : summary.at(field).at("refused").items())
+        EXPECT_EQ(totals.at(field).at("refused").at(reason), count) << reason;
+  }
+}
+
+TEST_F(ResultsOf01, GoOn) {
+  const Command resumed = go_on("fixed");
+  ASSERT_EQ(resumed.wait(), 0) << resumed.said();
+  EXPECT_NE(resumed.said().find("going on after step 5"), std::string::npos) << resumed.said();
+  const Command anew = run("anew", {}, {"--defaults", "itr-0"});
+  ASSERT_EQ(anew.wait(), 0) << anew.said();
+  const std::vector<Json> lines = results_of(folder / "fixed"), expected = results_of(folder / "anew");
+  ASSERT_EQ(lines.size(), 9u);
+  ASSERT_EQ(expected.size(), 9u);
+  for (const int step : {5, 8})
+    for (const char* term : {"inertia", "elastic", "body", "total"}) {
+      const double energy = expected[step]["energy"][term];
+      EXPECT_NEAR(lines[step]["energy"][term].get<double>(), energy, 1e-6 * std::abs(energy)) << term << " of step " << step;
+    }
+  EXPECT_EQ(summary_of(folder / "fixed")["steps"], 8);
+
+  const Command remeshed = go_on("remeshed", {"/space/remesh/enabled=true"});
+  ASSERT_EQ(remeshed.wait(), 0) << remeshed.said();
+  EXPECT_NE(remeshed.said().find("going on after step 5"), std::string::npos) << remeshed.said();
+  EXPECT_EQ(results_of(folder / "remeshed").size(), 9u);
+  const auto tried = [](const fs::path& run) { return summary_of(run)["splits"]["tried"].get<int>(); };
+  EXPECT_GT(tried(folder / "remeshed"), tried(data / "remeshed"));
+}
+
+TEST_F(ResultsOf01, AreReadByTheCommands) {
+  for (const std::string name : {"fixed", "remeshed"}) {
+    fs::copy(data / name, folder / name, fs::copy_options::recursive);
+    const std::string run = (folder / name).string(), forces = text_of(folder / name / "forces.csv");
+    const Command certified = itr({"certify", run});
+    EXPECT_EQ(certified.wait(), 0) << certified.said();
+    const Command completed = itr({"forces", run});
+    EXPECT_EQ(completed.wait(), 0) << completed.said();
+    EXPECT_EQ(count_lines(folder / name / "forces.csv"), 7) << "a header, step 0 and five steps";
+    const Command page = itr({"report", run});
+    EXPECT_EQ(page.wait(), 0) << page.said();
+  }
+  const Command compared = itr({"distance", (folder / "fixed").string(), (folder / "remeshed").string()});
+  ASSERT_EQ(compared.wait(), 0) << compared.said();
+  const Json errors = Json::parse(compared.said());
+  EXPECT_EQ(errors["times"], 1);
+  EXPECT_GT(errors["l2"].get<double>(), 0);
+  EXPECT_LT(errors["l2"].get<double>(), 0.2);
+}
+
 }  // namespace
 }  // namespace itr::output

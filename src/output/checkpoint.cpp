@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "frame_file.hpp"
 #include "itr/core.hpp"
@@ -17,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kFormat = 9;
-constexpr std::int64_t kFormatOfLists = 8;  ///< totals without names
+constexpr std::int64_t kOldestFormat = 7;  ///< of itr 0.1
 /// In SI units, where the frame is in others: of the vertices, and of the state.
 constexpr const char* kRest = "/checkpoint/rest";
 constexpr const char* kTime = "/checkpoint/t";
@@ -289,6 +290,22 @@ void read_step_control(const fs::path& path, const hdf5::File& file, State<Dim>&
   state.history.dt = control[3];
 }
 
+struct Texts {
+  std::string scene, totals;
+};
+
+/// Texts of a state, those of itr 0.1 (formats 7 and 8) as this version writes them: totals were numbers without names, and
+/// scenes named no set of defaults.
+Texts read_texts(const hdf5::File& file) {
+  std::string scene = file.read_text("/checkpoint/scene");
+  if (file.read_integer_attribute("checkpoint_format") == kFormat) return {scene, file.read_text("/checkpoint/totals")};
+  if (auto json = nlohmann::json::parse(scene, nullptr, false); json.is_object()) {
+    json["defaults"] = "itr-0";
+    scene = json.dump();
+  }
+  return {scene, totals_of_list(file.read_doubles("/checkpoint/totals").values)};
+}
+
 }  // namespace
 
 template <int Dim>
@@ -350,9 +367,9 @@ std::optional<SavedState> find_saved_state(const fs::path& directory, int before
       const hdf5::File file = hdf5::File::open(path);
       if (!file.contains("/checkpoint")) continue;
       const std::int64_t format = file.read_integer_attribute("checkpoint_format");
-      if (format != kFormat && format != kFormatOfLists) continue;
+      if (format < kOldestFormat || format > kFormat) continue;
       return SavedState{path,
-                        file.read_text("/checkpoint/scene"),
+                        read_texts(file).scene,
                         file.read_text("/checkpoint/backend"),
                         file.shape("/mesh/rest").columns,
                         step_of_frame(path),
@@ -415,9 +432,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   } else {
     throw InputError({saved.file.string(), kTime, std::to_string(t.size()) + " numbers", "1"});
   }
-  checkpoint.totals = file.read_integer_attribute("checkpoint_format") == kFormatOfLists
-                          ? totals_of_list(file.read_doubles("/checkpoint/totals").values)
-                          : file.read_text("/checkpoint/totals");
+  checkpoint.totals = read_texts(file).totals;
   const std::int64_t log_bytes = file.read_integer_attribute("checkpoint_log_bytes");
   if (log_bytes < 0)
     throw InputError({saved.file.string(), "attribute checkpoint_log_bytes", std::to_string(log_bytes), "0 or more"});

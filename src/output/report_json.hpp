@@ -37,8 +37,8 @@ class Totals {
   double gain_ = 0;  ///< by remeshing: sum of energy_before_remesh - total - history_loss [J]
 };
 
-/// Returns what Totals::save gives from the list of numbers of checkpoints of format 8. Throws InputError for a length that
-/// no version wrote.
+/// Returns what Totals::save gives from the list of numbers of checkpoints of formats 7 and 8. Throws InputError for a
+/// length that no version wrote.
 std::string totals_of_list(std::span<const double> numbers);
 
 }  // namespace itr::output

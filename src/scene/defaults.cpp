@@ -13,6 +13,8 @@ namespace {
 
 constexpr const char* kItr = "itr-1";  ///< a change of a value or a row is a new version
 constexpr const char* kPolyfem = "polyfem-1";
+constexpr const char* kOf01 = "itr-0";  ///< PolyFEM's but for the barrier stiffness, as itr 0.1 had them
+constexpr std::string_view kStiffness = "/solver/contact/barrier_stiffness";
 
 bool has_time(const Node& root) { return root.has("time"); }
 bool is_dynamic(const Node& root) { return has_time(root) && !root["time"]["quasistatic"].boolean(false); }
@@ -70,18 +72,21 @@ std::string polyfem_keys(const Node& root) {
 std::span<const Default> itr_defaults() { return kItrDefaults; }
 
 const std::vector<std::string>& names_of_sets() {
-  static const std::vector<std::string> names = {"itr", "polyfem", kItr, kPolyfem};
+  static const std::vector<std::string> names = {"itr", "polyfem", kItr, kPolyfem, kOf01};
   return names;
 }
 
-bool is_polyfem_set(const Node& root) { return root["defaults"].choice(names_of_sets(), 0) % 2 == 1; }
+/// The set that a scene asks for, by its name.
+static const std::string& asked_set(const Node& root) { return names_of_sets()[root["defaults"].choice(names_of_sets(), 0)]; }
+
+bool is_polyfem_set(const Node& root) { return asked_set(root).starts_with("polyfem"); }
 
 ChosenDefaults apply_defaults(Document& document) {
   ChosenDefaults chosen;
   const Node root(document);
   const bool is_polyfem = is_polyfem_set(root);
   chosen.is_asked_for = root.has("defaults");
-  chosen.name = is_polyfem ? kPolyfem : kItr;
+  chosen.name = is_polyfem ? kPolyfem : asked_set(root) == kOf01 ? kOf01 : kItr;
   if (is_polyfem) {
     chosen.unlike_polyfem.assign(std::begin(kUnlikePolyfem), std::end(kUnlikePolyfem));
     return chosen;
@@ -94,6 +99,7 @@ ChosenDefaults apply_defaults(Document& document) {
   Json with_defaults = document.json;
   for (const Default& row : kItrDefaults) {
     const Json::json_pointer pointer(row.pointer);
+    if (chosen.name == kOf01 && row.pointer != kStiffness) continue;
     if (with_defaults.contains(pointer) || !row.is_needed(root)) continue;
     with_defaults[pointer] = Json::parse(row.value);
     chosen.values.push_back({row.pointer, row.value, row.reason});

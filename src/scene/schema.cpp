@@ -170,7 +170,8 @@ std::string section_of_defaults() {
   std::string text =
       "\n## Defaults\n\nThere are two sets. A scene that says nothing gets ITR's. `\"defaults\": \"polyfem\"`, or "
       "`itr run --defaults polyfem`, gives those of PolyFEM. `summary.json` and saved states name the set with its version, "
-      "such as `itr-1`, and `--resume` keeps it. `itr explain` prints what a scene gets. These keys have other defaults in "
+      "such as `itr-1`, and `--resume` keeps it. Runs of version 0.1 go on with `itr-0`: PolyFEM's set, but for "
+      "`barrier_stiffness`, which is `\"auto\"`. `itr explain` prints what a scene gets. These keys have other defaults in "
       "ITR's set:\n\n| key | ITR | PolyFEM | why |\n|---|---|---|---|\n";
   for (const Default& row : itr_defaults()) {
     const Entry* entry = key_table().find(row.pointer);
