@@ -77,7 +77,9 @@ const std::vector<std::string>& names_of_sets() {
 }
 
 /// The set that a scene asks for, by its name.
-static const std::string& asked_set(const Node& root) { return names_of_sets()[root["defaults"].choice(names_of_sets(), 0)]; }
+static const std::string& asked_set(const Node& root) {
+  return names_of_sets()[root["defaults"].choice(names_of_sets(), 0)];
+}
 
 bool is_polyfem_set(const Node& root) { return asked_set(root).starts_with("polyfem"); }
 
