@@ -172,6 +172,11 @@ TEST(Totals, AreRestoredFromAListOfNumbers) {
   EXPECT_EQ(report.splits.refused[0], 56);
   EXPECT_EQ(report.smooths.refused[kRefusals - 1], 55 + 6 * kRefusals);
 
+  numbers.resize(50);
+  output::Totals older;
+  older.restore(output::totals_of_list(numbers));
+  EXPECT_EQ(older.report().peak_rss_mb, 49);
+  EXPECT_EQ(older.report().curves.tried, 0);
   numbers.pop_back();
   EXPECT_THROW(output::totals_of_list(numbers), InputError);
 }

@@ -211,12 +211,12 @@ std::string totals_of_list(std::span<const double> numbers) {
   static constexpr const char* kLast[] = {
       "t", "energy_before_remesh", "history_loss", "min_distance", "min_volume_ratio", "processor_seconds", "peak_rss_mb"};
   static constexpr const char* kCounts[] = {"tried", "relaxed", "accepted"};
-  constexpr std::size_t kLength = 16 + 4 * 3 + 7 + 8 + 7 + 6 + 6 * kRefusals;
-  if (numbers.size() != kLength)
+  constexpr std::size_t kFirstLength = 16 + 4 * 3 + 7 + 8 + 7, kLength = kFirstLength + 6 + 6 * kRefusals;
+  if (numbers.size() != kFirstLength && numbers.size() != kLength)
     throw InputError({"", "saved totals", std::to_string(numbers.size()) + " numbers", std::to_string(kLength)});
   Json json;
   std::size_t next = 0;
-  const auto take = [&] { return to_json(numbers[next++]); };
+  const auto take = [&] { return next < numbers.size() ? to_json(numbers[next++]) : Json(0); };
   const auto take_counts = [&](std::initializer_list<const char*> operations) {
     for (const char* operation : operations)
       for (const char* count : kCounts) json[operation][count] = take();
