@@ -93,7 +93,7 @@ class Cholmod {
     const itr::backends::OneOpenMpThread one_thread;
     ++factorizations_;
     if (factor_ && factor_->is_super) {
-      if (sources_.empty()) permute_pattern();
+      if (sources_.empty()) prepare_numeric();
       if (is_by_tasks_) {
         const int done = tasks_.factorize(values, sources_);
         return done < tasks_.order() ? refuse(done) : ITR_OK;
@@ -155,6 +155,16 @@ class Cholmod {
     common_.method[0].ordering = ordering;
     int* const given = ordering == CHOLMOD_GIVEN ? order_.permutation() : nullptr;
     factor_ = cholmod_analyze_p(&matrix_, given, nullptr, 0, &common_);
+  }
+
+  /// Where memory is out, the next factorisation begins anew.
+  void prepare_numeric() {
+    try {
+      permute_pattern();
+    } catch (...) {
+      sources_.clear();
+      throw;
+    }
   }
 
   /// The lower triangle in the factor's order. cholmod_factorize would find it anew each time, by two transpositions.

@@ -165,7 +165,8 @@ void check_command(const CLI::App& app, int argc, char** argv) {
   for (; *arguments; ++arguments) words.push_back(*arguments);
   words.push_back(nullptr);
   execvp(python.c_str(), words.data());
-  throw InputError({"", name, "no program " + python, "Python: apt install python3 python3-matplotlib python3-scipy"});
+  throw InputError({"", name, "no program " + python,
+                    fmt::format("Python: apt install python3 python3-matplotlib{}", name == "fit" ? " python3-scipy" : "")});
 }
 
 void check_single_rank() {
