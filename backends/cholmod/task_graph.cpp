@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <new>
 #include <numeric>
+#include <stdexcept>
 
 namespace itr::backends {
 
@@ -83,6 +85,17 @@ void TaskGraph::finish() {
   edges_ = {};
 }
 
+void TaskGraph::run_in_threads(const std::function<void(int)>& work) const {
+  try {
+    Run now(*this, work);
+    for (const int task : first_) now.start(task);
+    now.group.wait();
+    now.left.load(std::memory_order_acquire);
+  } catch (const std::runtime_error&) {  // of TBB, which found no room for the stack of a thread
+    throw std::bad_alloc();
+  }
+}
+
 void TaskGraph::run(const std::function<void(int)>& work, bool is_short) {
   seconds_.resize(size());
   const std::function<void(int)> timed = [&](int task) {
@@ -94,10 +107,7 @@ void TaskGraph::run(const std::function<void(int)>& work, bool is_short) {
   if (is_short || size() < 2 || num_threads() < 2) {
     for (int t = 0; t < size(); ++t) timed(t);
   } else {
-    Run now(*this, timed);
-    for (const int task : first_) now.start(task);
-    now.group.wait();
-    now.left.load(std::memory_order_acquire);
+    run_in_threads(timed);
   }
   const double sum = std::accumulate(seconds_.begin(), seconds_.end(), 0.0);
   times_ = {seconds_now() - start, sum, is_short ? sum : span(seconds_)};

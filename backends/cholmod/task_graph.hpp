@@ -37,6 +37,7 @@ class TaskGraph {
 
  private:
   struct Run;
+  void run_in_threads(const std::function<void(int)>& work) const;
   /// Longest chain, in the unit of these costs.
   double span(std::vector<double> costs) const;
 
