@@ -29,10 +29,6 @@ double thickness(const Mat<Dim>& F, const Material& material);
 
 /// The sum that a law is; null if it is another one.
 inline const LawSum* sum_of(const ElasticModuli& moduli) { return dynamic_cast<const LawSum*>(moduli.own); }
-inline Vec<3> place_of(const ElasticModuli& moduli) {
-  return {moduli.mooney_rivlin.c1, moduli.mooney_rivlin.c2, moduli.mooney_rivlin.c3};
-}
-inline void set_place(const Vec<3>& X, ElasticModuli& moduli) { moduli.mooney_rivlin = {X[0], X[1], X[2]}; }
 
 /// Decomposes a symmetric d2W/dF2, whose rows and columns are F by columns.
 template <int Dim>

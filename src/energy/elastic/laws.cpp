@@ -82,12 +82,11 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
   if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0, kInfinity);
   if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1, 0.5);
-  ElasticModuli moduli{material.law,
-                       {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
-                       material.mooney_rivlin,
-                       material.own.get()};
-  if (sum_of(moduli)) set_place(in_space<Dim>(X), moduli);
-  return moduli;
+  return {material.law,
+          {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
+          material.mooney_rivlin,
+          material.own.get(),
+          in_space<Dim>(X)};
 }
 
 template <int Dim>
@@ -111,7 +110,7 @@ double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli&
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_density<Dim>(G, lame);
     case MaterialLaw::own:
-      if (const LawSum* sum = sum_of(moduli)) return sum_density<Dim>(G, *sum, place_of(moduli));
+      if (const LawSum* sum = sum_of(moduli)) return sum_density<Dim>(G, *sum, moduli.X);
       return moduli.own->density(at.F());
     default:
       return mooney_rivlin_density<Dim>(G, moduli.mooney_rivlin);
@@ -136,7 +135,7 @@ Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_stress<Dim>(G, lame);
     case MaterialLaw::own: {
-      if (const LawSum* sum = sum_of(moduli)) return sum_stress<Dim>(G, *sum, place_of(moduli));
+      if (const LawSum* sum = sum_of(moduli)) return sum_stress<Dim>(G, *sum, moduli.X);
       MatrixX P(Dim, Dim);
       moduli.own->stress(at.F(), P);
       return P;
@@ -152,7 +151,7 @@ EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& mod
   if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
   if (moduli.law == MaterialLaw::own) {
     const LawSum* sum = sum_of(moduli);
-    return sum ? sum_eigensystem<Dim>(F, *sum, place_of(moduli)) : own_eigensystem<Dim>(F, *moduli.own);
+    return sum ? sum_eigensystem<Dim>(F, *sum, moduli.X) : own_eigensystem<Dim>(F, *moduli.own);
   }
   const SingularValues<Dim> svd = singular_values(F);
   switch (moduli.law) {

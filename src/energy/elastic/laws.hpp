@@ -6,6 +6,7 @@
 //   fixed corotated         mu sum (s_i - 1)^2 + lambda/2 (J - 1)^2,  s_i the singular values of F
 //   Mooney-Rivlin           c1 (I1 - d) + c2 (I2 - d) + c3 (I1 - d)(I2 - d) + k/2 (ln J)^2 + D (J - 1)^2,
 //                           I1, I2 the invariants of J^(-2/d) F F^T; the constant that makes W(I) = 0 is left out
+//   sums of laws            energy/elastic/law_table.hpp
 // Only the first is infinite at J = 0; the state's own rule, no inverted cell, holds for all of them.
 #pragma once
 
@@ -20,6 +21,7 @@ struct ElasticModuli {
   LameParameters lame{};
   MooneyRivlinModuli mooney_rivlin{};
   const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
+  Vec<3> X = Vec<3>::Zero();    ///< rest position, which directions of fibres depend on
 };
 
 /// Moduli of a material at rest position X.
