@@ -148,8 +148,7 @@ template <int Dim>
 MeshRenumbering changed_at_random(Mesh<Dim>& mesh, int edits, std::mt19937& random) {
   for (int i = 0; i < edits;)
     if (const auto edit = any_edit(mesh, random)) mesh.apply(*edit), ++i;
-  auto [vertex, cell, facet] = mesh.compact();
-  return {std::move(vertex), std::move(cell), std::move(facet)};
+  return mesh.compact();
 }
 
 /// Whether cell c of `a` overlaps a cell at v of `b`.

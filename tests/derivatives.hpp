@@ -16,7 +16,8 @@ inline MatrixX hessian_of(const Energy& energy, const VectorX& x, PsdProjection 
   Workspace workspace;
   const DofMap dofs = all_free(x.size());
   MatrixX lower = MatrixX::Zero(x.size(), x.size());
-  HessianSink sink(dofs, lower);
+  HessianTarget target(dofs, lower);
+  HessianSink sink(target);
   energy.add_hessian(x, psd, sink, workspace);
   return lower.selfadjointView<Eigen::Lower>();
 }

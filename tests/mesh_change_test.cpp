@@ -15,12 +15,6 @@ namespace {
 constexpr int kEdits = 5000;  ///< a dimension
 constexpr int kBatch = 25;    ///< edits of one change
 
-template <int Dim>
-MeshRenumbering compacted(Mesh<Dim>& mesh) {
-  auto [vertex, cell, facet] = mesh.compact();
-  return {std::move(vertex), std::move(cell), std::move(facet)};
-}
-
 double to_facet(const Vec<2>& p, const Mesh<2>& mesh, FacetId f) {
   return std::sqrt(point_edge_distance_squared<2>(p, mesh.rest(mesh.facet(f)[0]), mesh.rest(mesh.facet(f)[1])));
 }
@@ -98,7 +92,7 @@ TEST(MeshChange, IsToldRightly2D) {
       const Mesh<2> before = mesh;
       for (int i = 0; i < kBatch;)
         if (const auto edit = random_edit(mesh, random)) mesh.apply(*edit), ++i, ++edits;
-      check(before, mesh, describe_change(before, mesh, compacted(mesh)));
+      check(before, mesh, describe_change(before, mesh, mesh.compact()));
       if (testing::Test::HasFatalFailure()) FAIL() << "seed " << seed << ", batch " << batch;
     }
   }
@@ -115,7 +109,7 @@ TEST(MeshChange, IsToldRightly3D) {
       for (int i = 0; i < kBatch;)
         if (const auto proposal = propose_at_random(mesh, strata, static_cast<Operation>(random() % 5), random))
           apply(mesh, strata, *proposal.edit), ++i, ++edits;
-      check(before, mesh, describe_change(before, mesh, compacted(mesh)));
+      check(before, mesh, describe_change(before, mesh, mesh.compact()));
       if (testing::Test::HasFatalFailure()) FAIL() << "seed " << seed << ", batch " << batch;
     }
   }
@@ -129,7 +123,7 @@ TEST(MeshChange, OfTwoChangesIsThatOfBoth) {
   for (int part = 0; part < 2; ++part) {
     for (int i = 0; i < kBatch;)
       if (const auto edit = random_edit(mesh, random)) mesh.apply(*edit), ++i;
-    const MeshRenumbering one = compacted(mesh);
+    const MeshRenumbering one = mesh.compact();
     both = part == 0 ? one : compose(both, one);
   }
   check(before, mesh, describe_change(before, mesh, both));

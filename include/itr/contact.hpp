@@ -14,11 +14,20 @@
 
 namespace itr {
 
-struct CollisionSurface;
-struct ContactStencil;
-struct StepLimit;
-template <int Dim>
-struct PairDistance;
+struct CollisionSurface;  // opaque
+
+/// An active pair of primitives, reduced to its closest features. Nearly parallel edges stay edges.
+struct ContactStencil {
+  PairKind kind = PairKind::vertex_vertex;
+  std::array<int, 4> vertices{kNone, kNone, kNone, kNone};
+  double weight = 0;  ///< area weights and corrections included; may be negative
+  /// For nearly parallel edges: |u x v|^2 below which the pair fades out [m^4], and the features whose distance counts.
+  double mollifier_threshold = 0;
+  ClosestFeatures closest{};
+
+  int size() const { return pair_size(kind); }
+  bool is_mollified() const { return mollifier_threshold > 0; }
+};
 
 /// The surface with these primitives (edges of the triangles are added) and codimensional `points`. `rest`: positions of all
 /// vertices of the problem [m]; `counts` by vertex: whether pairs with it count, which is false for obstacles.

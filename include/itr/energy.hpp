@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <typeindex>
 #include <vector>
@@ -20,10 +21,6 @@
 namespace itr {
 
 struct BlockingPairs;
-struct DofMap;
-struct PrescribedMotion;
-class SparseAssembler;
-enum ElementKind : int;
 
 /// Cells with a vertex numbering of their own: the whole mesh, or the patch around an edit. Every energy term is built from
 /// one, so global and local problems share all their code.
@@ -86,58 +83,23 @@ enum class PsdProjection { none, clamp };
 /// Takes blocks (column-major) as they come, over all dofs.
 using BlockReceiver = std::function<void(std::span<const int> vertices, const double* block)>;
 
+class HessianTarget;
+
 /// Where a term adds the blocks of its Hessian. A program makes one over a receiver, to fill a matrix of its own.
 class ITR_EXPORT HessianSink {
  public:
-  explicit HessianSink(BlockReceiver receiver) : receiver_(std::move(receiver)) {}
+  explicit HessianSink(BlockReceiver receiver);
+  /// Serves the library's own solves (src/fem/hessian_sink.hpp); `target` must outlive this.
+  explicit HessianSink(HessianTarget& target) : target_(&target) {}
 
   /// Adds the symmetric `block` (column-major, Dim * vertices.size() squared) of a stencil.
   template <int Dim>
   void add(std::span<const int> vertices, const double* block);
-
-  // For the library's own solves and terms (src/fem/hessian_sink.hpp).
-
-  /// `dense` must outlive this.
-  HessianSink(const DofMap& dofs, Eigen::Ref<MatrixX> dense)
-      : dofs_(&dofs), dense_(dense.data()), dense_stride_(dense.outerStride()) {}
-  HessianSink(const DofMap& dofs, SparseAssembler& sparse) : dofs_(&dofs), sparse_(&sparse) {}
-  /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
-  void set_motion(PrescribedMotion& motion);
-  /// Adds a block for each straight element; `fill(e, block)` may be called at the same time for several of them.
-  template <int Dim, typename Fill>
-  void add_elements(const CellSet<Dim>& cells, const Fill& fill);
-  /// Adds each curved element by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
-  template <int Dim, typename Fill>
-  void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill);
-  /// One block times a factor for each straight element: a sum that is kept, and made anew only where it changes.
-  template <int Dim>
-  void add_multiples(const CellSet<Dim>& cells, std::span<const double> factors, const Mat<Dim*(Dim + 1)>& block);
-  /// A factor times a matrix `of(e)` by nodes for each curved element, the same in all directions. The sum is kept in the
-  /// same way; `matrices` are all that there are.
-  template <int Dim, typename Of>
-  void add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> matrices,
-                            const Of& of);
+  HessianTarget& target() { return *target_; }
 
  private:
-  bool is_patch() const { return dense_ && !motion_; }
-  template <int Dim>
-  std::uint16_t free_nodes(const typename CellSet<Dim>::Element& element) const;
-  template <int Dim, typename F>
-  void for_each_free_pair(const typename CellSet<Dim>::Element& element, std::uint16_t nodes, const F& f);
-  template <int Dim, typename Element, typename NodesOf, typename Fill>
-  void add_blocks(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of, const Fill& fill);
-  template <int Dim, typename Element, typename NodesOf, typename Fill>
-  void add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
-                    std::span<const double> factors, std::span<const double> block, const Fill& fill);
-  template <int Dim>
-  void add_motion(std::span<const int> vertices, const double* block);
-
-  const DofMap* dofs_ = nullptr;  ///< null where there is a receiver
-  double* dense_ = nullptr;
-  Eigen::Index dense_stride_ = 0;  ///< from column to column
-  SparseAssembler* sparse_ = nullptr;
-  BlockReceiver receiver_;
-  PrescribedMotion* motion_ = nullptr;
+  std::shared_ptr<HessianTarget> own_;  ///< of a receiver
+  HessianTarget* target_;
 };
 
 /// Scratch of one solve, owned by the caller: terms keep no mutable caches, so solves never meet. What is in it never
@@ -154,6 +116,13 @@ class Workspace {
 
  private:
   std::map<std::type_index, std::shared_ptr<void>> slots_;
+};
+
+/// Tightest limit of a step: which cell or pair stops it.
+struct StepLimit {
+  double step = 1;            ///< fraction of the step that it leaves; 1: nothing limits it
+  std::string kind;           ///< "cell", "vertex-edge pair", "vertex-triangle pair" or "edge-edge pair"
+  std::vector<int> vertices;  ///< of the cell or of the pair, in the order of `kind`
 };
 
 /// E: R^n -> R, +infinity outside the feasible set; x interleaved positions [m], n = Dim * num_vertices.

@@ -156,6 +156,15 @@ std::array<int, N> ascending(std::array<int, N> ids) {
   return ids;
 }
 
+/// New ids of a compact mesh by old id, kNone for an entity that is gone. Entries beyond those of the old mesh belong to
+/// entities that were made meanwhile.
+struct MeshRenumbering {
+  std::vector<VertexId> vertex;  ///< of vertices, and of nodes of curved edges
+  std::vector<CellId> cell;
+  std::vector<FacetId> facet;
+  bool empty() const { return vertex.empty(); }
+};
+
 template <int Dim>
 class ITR_EXPORT Mesh {
  public:
@@ -294,13 +303,8 @@ class ITR_EXPORT Mesh {
   /// the order of the edit; its nodes take the last slots of vertices. Fields are the caller's to extend (see Edit::Value).
   VertexId apply(const Edit<Dim>& edit);
 
-  struct Renumbering {
-    std::vector<VertexId> vertex;  ///< of vertices and nodes of curved edges: old id -> new id, kNone for dead ones
-    std::vector<CellId> cell;
-    std::vector<FacetId> facet;
-  };
   /// Removes dead slots, keeps the order of the others. Nodes of curved edges come last, in the order of their edges.
-  Renumbering compact();
+  MeshRenumbering compact();
 
   /// First broken invariant in words (adjacency, orientation, facets against cells), or an empty string.
   std::string find_defect() const;

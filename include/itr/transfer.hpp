@@ -77,14 +77,6 @@ ITR_EXPORT MatrixX project_l2(const TransferMesh<Dim>& old_mesh, const TransferM
 template <int Dim>
 ITR_EXPORT VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d);
 
-/// New ids of a compact mesh by old id, kNone for an entity that is gone. Entries beyond those of the old mesh belong to
-/// entities that were made meanwhile.
-struct MeshRenumbering {
-  std::vector<VertexId> vertex;
-  std::vector<CellId> cell;
-  std::vector<FacetId> facet;
-  bool empty() const { return vertex.empty(); }
-};
 /// Composes two changes, of a mesh with the given numbers of vertices, cells and facets before the first.
 ITR_EXPORT MeshRenumbering compose(const MeshRenumbering& first, const MeshRenumbering& second);
 

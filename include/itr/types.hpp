@@ -47,4 +47,26 @@ using CurvedEdges = std::uint8_t;
 template <int Dim>
 inline constexpr CurvedEdges kAllCurved = (1 << kSimplexEdges<Dim>)-1;
 
+/// Pairs of primitives, in the order of their positions: (p, q), (p, a, b), (p, a, b, c), (a0, a1, b0, b1).
+enum class PairKind : unsigned char { vertex_vertex, edge_vertex, face_vertex, edge_edge };
+
+constexpr int pair_size(PairKind kind) {
+  return kind == PairKind::vertex_vertex ? 2 : kind == PairKind::edge_vertex ? 3 : 4;
+}
+
+/// The closest features of a pair: of `kind`, between the positions `local` of the pair (pair_size(kind) of them).
+struct ClosestFeatures {
+  PairKind kind;
+  std::array<signed char, 4> local;
+  bool operator==(const ClosestFeatures&) const = default;
+};
+
+/// A pair whose own features are closest: distance between point, line or plane.
+template <int Dim>
+struct PairDistance {
+  double squared = 0;               ///< [m^2]
+  Vec<Dim> separation;              ///< r = sum of coefficient * position: from one closest point to the other [m]
+  Vec<4> coefficients{0, 0, 0, 0};  ///< they sum to 0; the gradient of the squared distance is 2 * coefficient * r
+};
+
 }  // namespace itr

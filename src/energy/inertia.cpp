@@ -146,12 +146,12 @@ void InertiaEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Wo
 
 template <int Dim>
 void InertiaEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
-  sink.add_multiples<Dim>(cells_, mass_, unit_mass_block<Dim>(kind_));
+  sink.target().add_multiples<Dim>(cells_, mass_, unit_mass_block<Dim>(kind_));
   if (curved_mass_.empty()) return;
   std::vector<double> factors;  // and what else the blocks follow from, beside their stencils
   for (const CurvedMass& curved : curved_mass_) factors.push_back(curved.mass);
   const std::span kept(matrices_.front().data(), static_cast<std::size_t>(matrices_.size() * matrices_.front().size()));
-  sink.add_curved_multiples<Dim>(
+  sink.target().add_curved_multiples<Dim>(
       cells_, factors, kept, [&](std::size_t e) -> const auto& { return matrices_[curved_mass_[e].matrix]; });
 }
 

@@ -157,8 +157,9 @@ void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& 
     if (const int part = loose_.of_element[e]; part != kNone) stiffness[e] = loose_.parts[part].stiffness * loose_.mass[e];
   const auto curved = cells_.curved();
   const std::size_t num_straight = stiffness.size() - curved.size();
-  sink.add_multiples<Dim>(cells_, std::span(stiffness).first(num_straight), unit_mass_block<Dim>(MassKind::consistent));
-  sink.add_curved_multiples<Dim>(
+  sink.target().add_multiples<Dim>(cells_, std::span(stiffness).first(num_straight),
+                                   unit_mass_block<Dim>(MassKind::consistent));
+  sink.target().add_curved_multiples<Dim>(
       cells_, std::span(stiffness).subspan(num_straight), {}, [&](std::size_t e) -> const auto& {
         return constant_quadratic_mass<Dim>(MassKind::consistent, curved[e].curved);
       });

@@ -229,7 +229,7 @@ bool SparseAssembler::finish() {
 }
 
 template <int Dim>
-void HessianSink::add(std::span<const int> vertices, const double* block) {
+void HessianTarget::add(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
   if (receiver_) return receiver_(vertices, block);
   constexpr int kUsual = 24;
@@ -254,7 +254,7 @@ void HessianSink::add(std::span<const int> vertices, const double* block) {
 }
 
 template <int Dim>
-void HessianSink::add_motion(std::span<const int> vertices, const double* block) {
+void HessianTarget::add_motion(std::span<const int> vertices, const double* block) {
   const int n = Dim * static_cast<int>(vertices.size());
   for (int j = 0; j < n; ++j) {
     const int dof = Dim * vertices[j / Dim] + j % Dim;
@@ -270,9 +270,19 @@ void HessianSink::add_motion(std::span<const int> vertices, const double* block)
   }
 }
 
+HessianSink::HessianSink(BlockReceiver receiver)
+    : own_(std::make_shared<HessianTarget>(std::move(receiver))), target_(own_.get()) {}
+
+template <int Dim>
+void HessianSink::add(std::span<const int> vertices, const double* block) {
+  target_->add<Dim>(vertices, block);
+}
+
 template void HessianSink::add<2>(std::span<const int>, const double*);
 template void HessianSink::add<3>(std::span<const int>, const double*);
-template void HessianSink::add_motion<2>(std::span<const int>, const double*);
-template void HessianSink::add_motion<3>(std::span<const int>, const double*);
+template void HessianTarget::add<2>(std::span<const int>, const double*);
+template void HessianTarget::add<3>(std::span<const int>, const double*);
+template void HessianTarget::add_motion<2>(std::span<const int>, const double*);
+template void HessianTarget::add_motion<3>(std::span<const int>, const double*);
 
 }  // namespace itr

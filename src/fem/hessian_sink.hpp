@@ -113,13 +113,64 @@ void for_each_node(NodeSet nodes, const F& f) {
     if (nodes >> k & 1) f(k);
 }
 
+/// Destination of the blocks of a Hessian: a dense matrix, a sparse one, or a program's receiver.
+class HessianTarget {
+ public:
+  /// `dense` must outlive this.
+  HessianTarget(const DofMap& dofs, Eigen::Ref<MatrixX> dense)
+      : dofs_(&dofs), dense_(dense.data()), dense_stride_(dense.outerStride()) {}
+  HessianTarget(const DofMap& dofs, SparseAssembler& sparse) : dofs_(&dofs), sparse_(&sparse) {}
+  explicit HessianTarget(BlockReceiver receiver) : receiver_(std::move(receiver)) {}
+
+  /// Collects `motion.coupling` and `motion.curvature` along with the blocks.
+  void set_motion(PrescribedMotion& motion);
+  /// Adds the symmetric `block` of a stencil.
+  template <int Dim>
+  void add(std::span<const int> vertices, const double* block);
+  /// Adds a block for each straight element; `fill(e, block)` may be called at the same time for several of them.
+  template <int Dim, typename Fill>
+  void add_elements(const CellSet<Dim>& cells, const Fill& fill);
+  /// Adds each curved element by `fill(e, nodes, block)`: only entries of these nodes count, the others are zero.
+  template <int Dim, typename Fill>
+  void add_curved_elements(const CellSet<Dim>& cells, const Fill& fill);
+  /// One block times a factor for each straight element: a sum that is kept, and made anew only where it changes.
+  template <int Dim>
+  void add_multiples(const CellSet<Dim>& cells, std::span<const double> factors, const Mat<Dim*(Dim + 1)>& block);
+  /// A factor times a matrix `of(e)` by nodes for each curved element, the same in all directions. The sum is kept in the
+  /// same way; `matrices` are all that there are.
+  template <int Dim, typename Of>
+  void add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors, std::span<const double> matrices,
+                            const Of& of);
+
+ private:
+  bool is_patch() const { return dense_ && !motion_; }
+  template <int Dim>
+  NodeSet free_nodes(const typename CellSet<Dim>::Element& element) const;
+  template <int Dim, typename F>
+  void for_each_free_pair(const typename CellSet<Dim>::Element& element, NodeSet nodes, const F& f);
+  template <int Dim, typename Element, typename NodesOf, typename Fill>
+  void add_blocks(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of, const Fill& fill);
+  template <int Dim, typename Element, typename NodesOf, typename Fill>
+  void add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
+                    std::span<const double> factors, std::span<const double> block, const Fill& fill);
+  template <int Dim>
+  void add_motion(std::span<const int> vertices, const double* block);
+
+  const DofMap* dofs_ = nullptr;  ///< null where there is a receiver
+  double* dense_ = nullptr;
+  Eigen::Index dense_stride_ = 0;  ///< from column to column
+  SparseAssembler* sparse_ = nullptr;
+  BlockReceiver receiver_;
+  PrescribedMotion* motion_ = nullptr;
+};
+
 namespace detail {
 constexpr std::size_t kElementsPerTask = 64;
 inline constexpr auto vertices_of = [](const auto& element) -> const auto& { return element.vertices; };
 inline constexpr auto nodes_of = [](const auto& element) { return element.nodes(); };
 }  // namespace detail
 
-inline void HessianSink::set_motion(PrescribedMotion& motion) {
+inline void HessianTarget::set_motion(PrescribedMotion& motion) {
   motion.curvature = 0;
   motion.coupling.resize(0);
   if (motion.step.size() == 0) return;
@@ -128,12 +179,12 @@ inline void HessianSink::set_motion(PrescribedMotion& motion) {
 }
 
 template <int Dim, typename Fill>
-void HessianSink::add_elements(const CellSet<Dim>& cells, const Fill& fill) {
+void HessianTarget::add_elements(const CellSet<Dim>& cells, const Fill& fill) {
   add_blocks<Dim>(kStraight, cells.straight(), detail::vertices_of, fill);
 }
 
 template <int Dim, typename Fill>
-void HessianSink::add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
+void HessianTarget::add_curved_elements(const CellSet<Dim>& cells, const Fill& fill) {
   const auto elements = cells.curved();
   if (elements.empty()) return;
   if (!is_patch())
@@ -149,16 +200,16 @@ void HessianSink::add_curved_elements(const CellSet<Dim>& cells, const Fill& fil
 }
 
 template <int Dim>
-void HessianSink::add_multiples(const CellSet<Dim>& cells, std::span<const double> factors,
-                                const Mat<Dim*(Dim + 1)>& block) {
+void HessianTarget::add_multiples(const CellSet<Dim>& cells, std::span<const double> factors,
+                                  const Mat<Dim*(Dim + 1)>& block) {
   const auto fill = [&](std::size_t e, Mat<Dim*(Dim + 1)>& multiple) { multiple = factors[e] * block; };
   add_constant<Dim>(kStraight, cells.straight(), detail::vertices_of, factors,
                     {block.data(), static_cast<std::size_t>(block.size())}, fill);
 }
 
 template <int Dim, typename Of>
-void HessianSink::add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors,
-                                       std::span<const double> matrices, const Of& of) {
+void HessianTarget::add_curved_multiples(const CellSet<Dim>& cells, std::span<const double> factors,
+                                         std::span<const double> matrices, const Of& of) {
   const auto elements = cells.curved();
   if (elements.empty()) return;
   constexpr int kNodes = kQuadraticNodes<Dim>;
@@ -182,7 +233,7 @@ void HessianSink::add_curved_multiples(const CellSet<Dim>& cells, std::span<cons
 
 /// The nodes of an element of which at least one component is an unknown.
 template <int Dim>
-NodeSet HessianSink::free_nodes(const typename CellSet<Dim>::Element& element) const {
+NodeSet HessianTarget::free_nodes(const typename CellSet<Dim>::Element& element) const {
   NodeSet free = 0;
   const auto of_element = element.nodes();
   for_each_node<Dim>(all_nodes<Dim>(element.curved), [&](int k) {
@@ -195,7 +246,7 @@ NodeSet HessianSink::free_nodes(const typename CellSet<Dim>::Element& element) c
 /// Calls f(row, column, entry) for the rows and columns of a block of the element, of these nodes, that are unknowns in the
 /// lower triangle of the dense matrix.
 template <int Dim, typename F>
-void HessianSink::for_each_free_pair(const typename CellSet<Dim>::Element& element, NodeSet nodes, const F& f) {
+void HessianTarget::for_each_free_pair(const typename CellSet<Dim>::Element& element, NodeSet nodes, const F& f) {
   std::array<int, Dim * kQuadraticNodes<Dim>> local, unknown;
   const auto of_element = element.nodes();
   int count = 0;
@@ -215,7 +266,8 @@ void HessianSink::for_each_free_pair(const typename CellSet<Dim>::Element& eleme
 }
 
 template <int Dim, typename Element, typename NodesOf, typename Fill>
-void HessianSink::add_blocks(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of, const Fill& fill) {
+void HessianTarget::add_blocks(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
+                               const Fill& fill) {
   constexpr int kNodes = static_cast<int>(std::tuple_size_v<std::decay_t<decltype(ids_of(elements[0]))>>);
   using Block = Mat<Dim * kNodes>;
   const std::size_t n = elements.size();
@@ -247,8 +299,8 @@ void HessianSink::add_blocks(ElementKind kind, std::span<const Element> elements
 }
 
 template <int Dim, typename Element, typename NodesOf, typename Fill>
-void HessianSink::add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
-                               std::span<const double> factors, std::span<const double> block, const Fill& fill) {
+void HessianTarget::add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
+                                 std::span<const double> factors, std::span<const double> block, const Fill& fill) {
   if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, ids_of, fill);
   if (sparse_->add_cached(kind, factors, block)) return;
   sparse_->begin_keeping();

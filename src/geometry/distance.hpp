@@ -11,32 +11,12 @@
 
 namespace itr {
 
-/// Order of the positions: (p, q), (p, a, b), (p, a, b, c), (a0, a1, b0, b1).
-enum class PairKind : unsigned char { vertex_vertex, edge_vertex, face_vertex, edge_edge };
-
-constexpr int pair_size(PairKind kind) {
-  return kind == PairKind::vertex_vertex ? 2 : kind == PairKind::edge_vertex ? 3 : 4;
-}
-
-/// The closest features of a pair: of `kind`, between the positions `local` of the pair (pair_size(kind) of them).
-struct ClosestFeatures {
-  PairKind kind;
-  std::array<signed char, 4> local;
-  bool operator==(const ClosestFeatures&) const = default;
-};
-
 /// `x`: the positions of the pair. Of equally close features the first in a fixed order is taken. Degenerate edges count as
 /// their first vertex, degenerate triangles as their edges, parallel edges as one edge and a vertex of the other.
 template <int Dim>
 ClosestFeatures closest_features(PairKind kind, const Vec<Dim>* x);
 
-/// A pair whose own features are closest: distance between point, line or plane.
-template <int Dim>
-struct PairDistance {
-  double squared = 0;               ///< [m^2]
-  Vec<Dim> separation;              ///< r = sum of coefficient * position: from one closest point to the other [m]
-  Vec<4> coefficients{0, 0, 0, 0};  ///< they sum to 0; the gradient of the squared distance is 2 * coefficient * r
-};
+/// The distance of a pair whose own features are closest.
 template <int Dim>
 PairDistance<Dim> pair_distance(PairKind kind, const Vec<Dim>* x);
 

@@ -364,9 +364,9 @@ VertexId Mesh<Dim>::apply(const Edit<Dim>& edit) {
 }
 
 template <int Dim>
-typename Mesh<Dim>::Renumbering Mesh<Dim>::compact() {
-  Renumbering map{std::vector<VertexId>(node_slots(), kNone), std::vector<CellId>(cell_slots(), kNone),
-                  std::vector<FacetId>(facet_slots(), kNone)};
+MeshRenumbering Mesh<Dim>::compact() {
+  MeshRenumbering map{std::vector<VertexId>(node_slots(), kNone), std::vector<CellId>(cell_slots(), kNone),
+                      std::vector<FacetId>(facet_slots(), kNone)};
   int vertices = 0, cells = 0, facets = 0;
   for (int v = 0; v < node_slots(); ++v) {
     if (!vertex_alive_[v]) continue;

@@ -405,7 +405,7 @@ void Strata<Dim>::follow(const Edit<Dim>& edit, VertexId created) {
 }
 
 template <int Dim>
-void Strata<Dim>::compact(const typename Mesh<Dim>::Renumbering& map) {
+void Strata<Dim>::compact(const MeshRenumbering& map) {
   const auto is_kept = [](VertexId v) { return v != kNone; };
   std::vector<Stratum> vertices(std::count_if(map.vertex.begin(), map.vertex.end(), is_kept));
   for (std::size_t v = 0; v < map.vertex.size(); ++v)

@@ -79,7 +79,7 @@ class Strata {
   void follow(const Edit<Dim>& edit, VertexId created);
   /// Takes in that the mesh got so many nodes of curved edges.
   void add_nodes(int count) { vertices_.insert(vertices_.end(), count, Stratum::volume); }
-  void compact(const typename Mesh<Dim>::Renumbering& map);
+  void compact(const MeshRenumbering& map);
   /// First disagreement with what the mesh consists of, in words: a vertex or facet too many or without a patch.
   std::string find_misfit(const Mesh<Dim>& mesh) const;
   /// Finds a misfit, or a vertex off its patch's plane, or a facet folded over.

@@ -5,7 +5,6 @@
 #include <sstream>
 #include <string_view>
 
-#include "round_off.hpp"
 #include "saddle.hpp"
 
 namespace itr {
@@ -90,8 +89,7 @@ class Minimizer {
   NewtonSummary finish(Termination termination) {
     if (termination == Termination::round_off && !convergence_.is_at_round_off())
       return stop(Termination::no_descent, describe_residual());
-    if (saddle_.is_here()) return stop(Termination::round_off, kFlatSaddle);
-    return stop(termination, termination == Termination::round_off ? kAtRoundOff : "");
+    return stop(saddle_.is_here() ? Termination::saddle : termination);
   }
 
   NewtonSummary stop(Termination termination, std::string_view message = {}) {

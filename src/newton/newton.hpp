@@ -129,6 +129,7 @@ enum class Termination {
   decrement,   ///< Newton decrement below tolerance
   energy,      ///< energy does not change any more
   round_off,   ///< what a full step would gain or move is below round-off
+  saddle,      ///< there are directions of negative curvature, and none lowers the energy by more than round-off
   iterations,  ///< out of iterations
   no_descent,  ///< no direction or no step that lowers the energy, and the gradient is not small
   infeasible,  ///< the start is not feasible or a number is not finite
@@ -139,7 +140,7 @@ const char* to_string(Termination termination);
 
 struct NewtonSummary {
   Termination termination = Termination::iterations;
-  bool converged() const { return termination <= Termination::round_off; }
+  bool converged() const { return termination <= Termination::saddle; }
   int iterations = 0;
   int indefinite = 0;          ///< factorised Hessians with negative eigenvalues, where the solver tells
   int blocked = 0;             ///< iterations that went less than half of their step, for what is in the way
@@ -153,7 +154,7 @@ struct NewtonSummary {
   VectorX blocked_from, blocked_step;
   VectorX failed_step;    ///< full step of the last iteration where it did not converge, [m]; else empty
   int worst_dof = kNone;  ///< unknown with the largest residual where it did not converge
-  std::string message;    ///< what stopped it where it did not converge; what is to be known where it did
+  std::string message;    ///< what stopped it where it did not converge; what is lagged too far off where it did
 
   void add_effort(const NewtonSummary& other);
 };

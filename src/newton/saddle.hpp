@@ -11,9 +11,6 @@
 
 namespace itr {
 
-/// NewtonSummary::message of a solve that ends at a saddle.
-inline constexpr const char* kFlatSaddle = "the Hessian has negative eigenvalues, but no way along them lowers the energy";
-
 /// The way off a saddle, where Newton's method would end as if it were a minimum.
 class Saddle {
  public:

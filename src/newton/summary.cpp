@@ -16,7 +16,9 @@ const char* to_string(Termination termination) {
     case Termination::energy:
       return "energy change below tolerance";
     case Termination::round_off:
-      return "converged to round-off, not to the tolerance";
+      return "converged to the round-off of forces, above the tolerances asked for";
+    case Termination::saddle:
+      return "the Hessian has negative eigenvalues, but no way along them lowers the energy";
     case Termination::iterations:
       return "out of iterations";
     case Termination::no_descent:

@@ -26,8 +26,9 @@ void DenseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjectio
                            PrescribedMotion& motion, Workspace& workspace) {
   order_ = dofs.num_unknowns;
   hessian_.resize(order_ * order_).setZero();
-  HessianSink sink(dofs, hessian_.matrix(order_));
-  sink.set_motion(motion);
+  HessianTarget target(dofs, hessian_.matrix(order_));
+  target.set_motion(motion);
+  HessianSink sink(target);
   energy.add_hessian(x, psd, sink, workspace);
 }
 
@@ -80,8 +81,9 @@ void SparseSystem::assemble(const Energy& energy, ConstVectorView x, PsdProjecti
                             PrescribedMotion& motion, Workspace& workspace) {
   matrix_ = {};
   assembler_.begin();
-  HessianSink sink(dofs, assembler_);
-  sink.set_motion(motion);
+  HessianTarget target(dofs, assembler_);
+  target.set_motion(motion);
+  HessianSink sink(target);
   energy.add_hessian(x, psd, sink, workspace);
   if (!assembler_.finish()) return;
   pattern_changed_ = true;

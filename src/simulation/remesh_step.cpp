@@ -264,9 +264,8 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   const ScopedTimer timer(report.seconds.projection);
   const auto phase = ScopedPhase::coarse("projection");
   TouchedCells touched{removed_cells(before.mesh, state.mesh), {}};
-  auto map = state.mesh.compact();
-  state.strata.compact(map);
-  MeshRenumbering renumbering{std::move(map.vertex), std::move(map.cell), std::move(map.facet)};
+  MeshRenumbering renumbering = state.mesh.compact();
+  state.strata.compact(renumbering);
   state.remesh_memory.renumber(renumbering.vertex);
   for (int c = before.mesh.cell_slots(); c < static_cast<int>(renumbering.cell.size()); ++c)
     if (renumbering.cell[c] != kNone) touched.new_cells.push_back(renumbering.cell[c]);

@@ -17,8 +17,6 @@
 #include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
-#include "newton/round_off.hpp"
-#include "newton/saddle.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/energy_guard.hpp"
@@ -398,12 +396,10 @@ class StepSolver {
     report_.newton_iterations += summary.iterations;
     report_.residual_worth = std::max(report_.residual_worth, summary.decrement / problem_->scaling());
     report_.indefinite += summary.indefinite;
-    if (summary.converged() && !summary.message.empty()) {
-      if (summary.message == kAtRoundOff || summary.message == kFlatSaddle)
-        tools_.logger.debug(fmt::format("step {}: {}", next_.step, summary.message));
-      else
-        warn(summary.message);
-    }
+    if (summary.converged() && !summary.message.empty())
+      warn(summary.message);
+    else if (summary.termination == Termination::round_off || summary.termination == Termination::saddle)
+      tools_.logger.debug(fmt::format("step {}: {}", next_.step, to_string(summary.termination)));
     if (summary.iterations > kManyIterations)
       tools_.logger.info(fmt::format("step {}: {}", next_.step, problem_->describe_effort(summary)));
     if (summary.linear_residual > kPoorResidual)

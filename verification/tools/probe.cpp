@@ -72,7 +72,8 @@ SparseAssembler hessian(const Energy& energy, const CellSet<Dim>& cells, const V
   SparseAssembler assembler;
   assembler.reset(dofs, Dim, element_stencils(cells));
   assembler.begin();
-  HessianSink sink(dofs, assembler);
+  HessianTarget target(dofs, assembler);
+  HessianSink sink(target);
   energy.add_hessian(x, PsdProjection::none, sink, workspace);
   assembler.finish();
   return assembler;

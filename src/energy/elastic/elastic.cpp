@@ -257,7 +257,7 @@ double ElasticEnergy<Dim>::value_round_off_at(const Increment& at, Workspace& wo
 template <int Dim>
 void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
   const Displacement<Dim> u(cells_.rest, x);
-  sink.add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
+  sink.target().add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
     const auto& element = cells_.elements[e];
     const auto at = displacement_gradient<Dim>(element, u);
     const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);

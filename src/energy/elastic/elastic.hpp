@@ -9,7 +9,6 @@
 #include "energy/elastic/laws.hpp"
 #include "energy/energy.hpp"
 #include "energy/increment.hpp"
-#include "energy/step_limit.hpp"
 #include "fem/cell_set.hpp"
 #include "fem/quadrature.hpp"
 

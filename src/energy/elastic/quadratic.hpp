@@ -15,7 +15,6 @@
 #include "energy/elastic/neo_hookean.hpp"
 #include "energy/energy.hpp"
 #include "energy/project_block.hpp"
-#include "energy/step_limit.hpp"
 #include "fem/cell_set.hpp"
 #include "fem/displacement.hpp"
 #include "fem/quadrature.hpp"
@@ -216,7 +215,7 @@ class QuadraticElasticity {
     });
   }
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
-    sink.add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
+    sink.target().add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
       const Element& element = elements_[e];
       const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
       const auto& rule = this->rule(e);
