@@ -64,7 +64,7 @@ TEST(Registry, NamesOfOthersMapToOurs) {
   EXPECT_EQ(Registry::canonical_name("cholmod"), "cholmod");
   EXPECT_EQ(Registry::canonical_name("Eigen::SimplicialLDLT"), "eigen:ldlt");
   EXPECT_EQ(Registry::canonical_name("Eigen::SparseLU"), "eigen:lu");
-  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod");
+  EXPECT_EQ(Registry::canonical_name("Eigen::CholmodSupernodalLLT"), "cholmod:tasks");
   for (const char* name : {"Eigen::PardisoLLT", "Eigen::AccelerateLDLT", "Hypre", "AMGCL", "Trilinos"})
     EXPECT_EQ(Registry::canonical_name(name), "") << name;
 }

@@ -206,7 +206,7 @@ std::string Registry::canonical_name(const std::string& name) {
                                                               {"Eigen::SimplicialLLT", "eigen:llt"},
                                                               {"Eigen::SparseLU", "eigen:lu"},
                                                               {"Eigen::ConjugateGradient", "eigen:cg"},
-                                                              {"Eigen::CholmodSupernodalLLT", "cholmod"},
+                                                              {"Eigen::CholmodSupernodalLLT", "cholmod:tasks"},
                                                               {"Eigen::CholmodSimplicialLLT", "cholmod:simplicial"},
                                                               {"Eigen::CholmodDecomposition", "cholmod"},
                                                               {"Eigen::UmfPackLU", "umfpack"}};
