@@ -305,11 +305,13 @@ TEST(Auto, PicksBySizeDefinitenessAndWhatIsThere) {
       there({"eigen:ldlt", "dense", "eigen:cg", "cholmod", "cholmod:tasks", "mumps", "mumps:spd", "umfpack", "belos:muelu"});
   const auto none = there({"eigen:ldlt", "dense", "eigen:cg"});
   constexpr double kGiB = 1024.0 * 1024 * 1024;
-  const MatrixTraits tiny{30, 200, 2, false, kGiB}, small{2000, 16'000, 2, false, kGiB},
+  const MatrixTraits tiny{30, 200, 2, false, kGiB}, small{1200, 9'000, 2, false, kGiB},
       large{200'000, 1'600'000, 2, false, 64 * kGiB}, large_3d{30'000, 700'000, 3, false, 64 * kGiB},
       indefinite{200'000, 1'600'000, 2, true, 64 * kGiB}, huge{3'000'000, 70'000'000, 3, false, 16 * kGiB};
   EXPECT_EQ(pick_solver(tiny, all).name, "dense");
   EXPECT_EQ(pick_solver(small, all).name, "eigen:ldlt");
+  EXPECT_EQ(pick_solver({2000, 16'000, 2, false, kGiB}, all).name, "cholmod:tasks");
+  EXPECT_EQ(pick_solver({2000, 16'000, 2, false, kGiB}, none).name, "eigen:ldlt");
   EXPECT_EQ(pick_solver(large, all).name, "cholmod:tasks");
   EXPECT_EQ(pick_solver(large_3d, all).name, "cholmod:tasks");
   EXPECT_EQ(pick_solver({30'000, 700'000, 3, false, 3e9, 2e9}, all).name, "cholmod");  // contributions would not fit
@@ -355,7 +357,7 @@ TEST(Auto, AsksOnlyAboutSolversInQuestion) {  // an answer may load a module of 
     return true;
   };
   constexpr double kMemory = 64e9;
-  pick_solver({2000, 16'000, 2, false, kMemory}, all);
+  pick_solver({1200, 9'000, 2, false, kMemory}, all);
   EXPECT_TRUE(asked.empty());
   pick_solver({30'000, 700'000, 3, false, kMemory}, all);
   EXPECT_EQ(asked, std::vector<std::string>{"cholmod:tasks"});

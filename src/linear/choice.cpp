@@ -20,6 +20,7 @@ namespace {
 constexpr int kDenseBelow = 60;
 constexpr const char* kTasks = "cholmod:tasks";
 constexpr double kContributions = 0.7;  ///< memory beside the factor that cholmod:tasks takes, over the factor
+constexpr std::size_t kTasksAbove = 10'000;  // nonzeros of the lower triangle, from which solves are as fast as eigen:ldlt's
 constexpr std::size_t kSupernodalAbove2d = 60'000, kSupernodalAbove3d = 20'000;  // nonzeros of the lower triangle
 
 double half_of_memory() {
@@ -231,6 +232,9 @@ Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char
     return {"eigen:cg", why + std::string(", and belos:muelu is not there")};
   }
   if (traits.order <= kDenseBelow && !traits.may_be_indefinite) return {"dense", "tiny"};
+  if (!traits.may_be_indefinite && traits.nonzeros > kTasksAbove && !outgrows_memory(traits, kContributions) &&
+      is_there(kTasks))
+    return {kTasks, "dense blocks of the factor pay, on all threads"};
   const bool is_large = traits.nonzeros > (is_3d ? kSupernodalAbove3d : kSupernodalAbove2d);
   if (!is_large) return {"eigen:ldlt", "small, so nothing is gained by dense blocks"};
   if (traits.may_be_indefinite) {
@@ -238,8 +242,6 @@ Pick pick_solver(const MatrixTraits& traits, const std::function<bool(const char
       if (is_there(name)) return {name, "large, and it may be indefinite"};
     return {"eigen:ldlt", "it may be indefinite, and neither mumps nor umfpack is there"};
   }
-  if (!outgrows_memory(traits, kContributions) && is_there(kTasks))
-    return {kTasks, "large: dense blocks of the factor pay, on all threads"};
   for (const char* name : {"cholmod", "mumps:spd"})
     if (is_there(name)) return {name, "large: dense blocks of the factor pay"};
   return {"eigen:ldlt", "neither cholmod nor mumps is there"};
