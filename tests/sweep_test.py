@@ -77,6 +77,11 @@ class Sweep(unittest.TestCase):
         said, rows = self.collect()
         self.assertEqual(rows[0]["outcome"], "unfinished")
         self.assertEqual(self.plan("--vary", "/geometry/0/n_refs=2", "--set", "/time/dt=0.001"), lines)
+        done = subprocess.run(["sh", "-c", lines[0] + " --set /time/tend=0.01"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("going on after step", done.stdout + done.stderr)
+        said, rows = self.collect()
+        self.assertEqual(rows[0]["outcome"], "finished")
 
     def test_refuses_another_sweep_in_its_folder(self):
         self.plan("--vary", "/materials/0/E=1e6,2e6")

@@ -5,10 +5,7 @@
 
 #include <algorithm>
 #include <new>
-#include <numeric>
 #include <utility>
-
-#include "dense_kernels.hpp"
 
 namespace itr::backends {
 

@@ -290,20 +290,21 @@ void read_step_control(const fs::path& path, const hdf5::File& file, State<Dim>&
   state.history.dt = control[3];
 }
 
-struct Texts {
-  std::string scene, totals;
-};
-
-/// Texts of a state, those of itr 0.1 (formats 7 and 8) as this version writes them: totals were numbers without names, and
-/// scenes named no set of defaults.
-Texts read_texts(const hdf5::File& file) {
+/// The scene as this version writes it; those of itr 0.1 (formats 7 and 8) named no set of defaults.
+std::string read_scene(const hdf5::File& file) {
   std::string scene = file.read_text("/checkpoint/scene");
-  if (file.read_integer_attribute("checkpoint_format") == kFormat) return {scene, file.read_text("/checkpoint/totals")};
+  if (file.read_integer_attribute("checkpoint_format") == kFormat) return scene;
   if (auto json = nlohmann::json::parse(scene, nullptr, false); json.is_object()) {
     json["defaults"] = "itr-0";
     scene = json.dump();
   }
-  return {scene, totals_of_list(file.read_doubles("/checkpoint/totals").values)};
+  return scene;
+}
+
+/// Totals as this version writes them; those of itr 0.1 were numbers without names.
+std::string read_totals(const hdf5::File& file) {
+  if (file.read_integer_attribute("checkpoint_format") == kFormat) return file.read_text("/checkpoint/totals");
+  return totals_of_list(file.read_doubles("/checkpoint/totals").values);
 }
 
 }  // namespace
@@ -369,7 +370,7 @@ std::optional<SavedState> find_saved_state(const fs::path& directory, int before
       const std::int64_t format = file.read_integer_attribute("checkpoint_format");
       if (format < kOldestFormat || format > kFormat) continue;
       return SavedState{path,
-                        read_texts(file).scene,
+                        read_scene(file),
                         file.read_text("/checkpoint/backend"),
                         file.shape("/mesh/rest").columns,
                         step_of_frame(path),
@@ -432,7 +433,7 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   } else {
     throw InputError({saved.file.string(), kTime, std::to_string(t.size()) + " numbers", "1"});
   }
-  checkpoint.totals = read_texts(file).totals;
+  checkpoint.totals = read_totals(file);
   const std::int64_t log_bytes = file.read_integer_attribute("checkpoint_log_bytes");
   if (log_bytes < 0)
     throw InputError({saved.file.string(), "attribute checkpoint_log_bytes", std::to_string(log_bytes), "0 or more"});

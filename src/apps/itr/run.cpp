@@ -11,10 +11,10 @@
 #include <csignal>
 #include <cstdio>
 #include <future>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -36,8 +36,8 @@ namespace itr::cli {
 
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
-volatile std::sig_atomic_t terminated = 0;
+// Any thread may be the one that handles a signal.
+std::atomic<bool> interrupted = false, terminated = false;
 std::atomic<bool> stop_now = false;  // what a solve looks at
 
 template <std::size_t N>
@@ -48,15 +48,14 @@ void say(const char (&text)[N]) {  // all that a signal's handler may do
 /// As batch systems send it, with little time left: the step is dropped, and the state before it is saved.
 void on_termination(int) {
   if (!stop_now) say("\nitr: dropping the step\n");
-  interrupted = 1;
-  terminated = 1;
+  interrupted = terminated = true;
   stop_now = true;
 }
 
 /// The step is finished and saved; the second signal drops it, and the third is the system's.
 void on_interrupt(int signal) {
   if (!interrupted) {
-    interrupted = 1;
+    interrupted = true;
     return say("\nitr: finishing the step; again to stop now\n");
   }
   stop_now = true;
@@ -64,29 +63,25 @@ void on_interrupt(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
-/// Says warnings, and gives them to the results' files too.
+/// Says warnings, and keeps them for the results' files. While a step that goes on is dropped, two threads do so.
 class Warnings {
  public:
-  /// Says it after "warning:" where it is the first of its kind, and passes it on to the writer, which counts the others.
+  /// Says it after "warning:" where it is the first of its kind.
   void add(std::string_view text) {
-    if (++said_[output::kind_of_warning(text)] == 1) spdlog::warn("warning: {}", text);
-    if (writer_)
-      writer_->warn(std::string(text));
-    else
-      kept_.emplace_back(text);
+    const std::scoped_lock guard(lock_);
+    if (said_.insert(output::kind_of_warning(text)).second) spdlog::warn("warning: {}", text);
+    kept_.emplace_back(text);
   }
-  /// Passes warnings on to the writer, also those from before it was there; null: keeps them for the next one.
-  void set_writer(output::Writer* writer) {
-    writer_ = writer;
-    if (!writer_) return;
-    for (const std::string& text : kept_) writer_->warn(text);
-    kept_.clear();
+  /// Returns those that have come since the last call.
+  std::vector<std::string> take() {
+    const std::scoped_lock guard(lock_);
+    return std::exchange(kept_, {});
   }
 
  private:
+  std::mutex lock_;
   std::vector<std::string> kept_;
-  std::map<std::string, int> said_;  ///< how often, by kind
-  output::Writer* writer_ = nullptr;
+  std::set<std::string> said_;  ///< kinds
 };
 
 Logger make_logger(Warnings& warnings) {
@@ -280,7 +275,6 @@ class Run {
                   ? std::make_unique<output::Writer>(std::move(folder), scene.output, info, restore(*saved, scene, options))
                   : std::make_unique<output::Writer>(std::move(folder), scene.output, info);
     if (options.profile) profile_.emplace(directory_, threads);
-    warnings_.set_writer(writer_.get());
     if (const int count = writer_->removed_files(); count > 0)
       spdlog::info("removed from {}: {} files of {}", directory_, count,
                    saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
@@ -459,17 +453,16 @@ class Run {
       });
     };
     if (!writes_beside_) return store();
-    warnings_.set_writer(nullptr);
     frame_ = std::async(std::launch::async, store);
   }
 
-  /// Waits for the frame that is being written. Throws InputError where it could not be.
+  /// Waits for the frame that is being written, then gives its writer the warnings since. Throws InputError where it could
+  /// not be written.
   void finish_frame() {
-    if (!frame_.valid()) return;
     const ScopedTimer timer(output_seconds_);
-    frame_.wait();
-    warnings_.set_writer(writer_.get());
-    frame_.get();
+    if (frame_.valid()) frame_.wait();
+    for (const std::string& text : warnings_.take()) writer_->warn(text);
+    if (frame_.valid()) frame_.get();
   }
 
   void save() {

@@ -4,6 +4,7 @@ commands.txt, and collects what is there into sweep.csv. The first argument is t
 
 import argparse
 import csv
+import io
 import itertools
 import json
 import os
@@ -91,6 +92,11 @@ def command_of(itr, options, folder, values):
     return shlex.join(words)
 
 
+def names_of(runs):
+    width = len(str(len(runs) - 1))
+    return [f"{number:0{width}}" for number in range(len(runs))]
+
+
 def write_whole(path, text):
     """A file that is there whole or as it was."""
     other = path.with_name(path.name + ".tmp")
@@ -101,15 +107,14 @@ def write_whole(path, text):
 def plan(itr, options):
     folder = pathlib.Path(options.output or pathlib.Path("sweep", pathlib.Path(options.scene).stem)).absolute()
     if not os.path.exists(options.scene):
-        fail(f'{options.scene}: no such file; expected a scene')
+        fail(f"{options.scene}: no such file; expected a scene")
     runs = combinations_of([read_variation(text) for text in options.vary])
     described = {"scene": os.path.abspath(options.scene), "set": options.set, "runs": runs}
     known = folder / "sweep.json"
     if known.exists() and json.loads(known.read_text()) != described:
         fail(f"{known}: another sweep; expected another folder (-o), or the same scene and values to go on")
     folder.mkdir(parents=True, exist_ok=True)
-    width = len(str(len(runs) - 1))
-    lines = [command_of(itr, options, folder / "runs" / f"{number:0{width}}", values) for number, values in enumerate(runs)]
+    lines = [command_of(itr, options, folder / "runs" / name, values) for name, values in zip(names_of(runs), runs)]
     write_whole(known, json.dumps(described, indent=1) + "\n")
     write_whole(folder / "commands.txt", "\n".join(lines) + "\n")
     array = ["#!/bin/sh", f"#SBATCH --array=1-{len(lines)}", f"#SBATCH --cpus-per-task={options.threads}",
@@ -157,19 +162,16 @@ def collect(folder):
     if not known.exists():
         fail(f"{folder}: no sweep.json; expected the folder of `itr sweep`")
     runs = json.loads(known.read_text())["runs"]
-    width = len(str(len(runs) - 1))
     rows = []
-    for number, values in enumerate(runs):
-        name = f"{number:0{width}}"
+    for name, values in zip(names_of(runs), runs):
         values = {pointer: value if isinstance(value, str) else json.dumps(value) for pointer, value in values.items()}
         rows.append({"run": name, **values, **result_of(folder / "runs" / name)})
     columns = list(dict.fromkeys(key for row in rows for key in row))
-    other = folder / "sweep.csv.tmp"
-    with open(other, "w", newline="") as file:
-        writer = csv.DictWriter(file, columns, restval="")
-        writer.writeheader()
-        writer.writerows(rows)
-    other.replace(folder / "sweep.csv")
+    table = io.StringIO()
+    writer = csv.DictWriter(table, columns, restval="")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_whole(folder / "sweep.csv", table.getvalue())
     outcomes = [row["outcome"] for row in rows]
     finished, none, unfinished = (outcomes.count(word) for word in ("finished", "none", "unfinished"))
     print(f"{folder / 'sweep.csv'}: {finished} of {len(rows)} runs are finished, {none} have not begun, {unfinished} have not ended, "
