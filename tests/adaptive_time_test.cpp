@@ -138,6 +138,25 @@ TEST(AdaptiveTime, EndsStepsAtKinksAndAtAskedTimes) {
   for (const double t : {0.0123, 0.05, 1 * 0.03, 2 * 0.03, 3 * 0.03, 0.1}) EXPECT_TRUE(times.count(t)) << t;
 }
 
+TEST(AdaptiveTime, StepsThatWereShortenedHaveErrorBarsToo) {
+  auto setup = swinging_square();
+  make_adaptive(setup, Integrator::bdf, 0.1, 0.02);
+  setup.time.dt = 0.002;
+  setup.fields.error_bars = true;
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  int rejected = 0;
+  while (!simulation.finished()) {
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    rejected += result.report.rejected_steps;
+    EXPECT_TRUE(result.report.errors.is_asked) << result.report.step;
+    EXPECT_EQ(result.report.errors.no_bar, "") << result.report.step;
+    EXPECT_EQ(result.errors.sources.size(), static_cast<std::size_t>(kErrorSources)) << result.report.step;
+  }
+  EXPECT_GT(rejected, 0);
+}
+
 /// The part of its kinetic energy that a block keeps after it has hit a wall and left it again, by where it starts.
 double energy_after_bounce(double gap, double tolerance) {
   auto setup = free_square(3);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "fem/unknowns.hpp"
 #include "mesh/refine.hpp"
 #include "simulation/closed_faces.hpp"
 
@@ -72,7 +73,17 @@ Mesh<Dim> finer_mesh(const Mesh<Dim>& mesh) {
 
 template <int Dim>
 FinerSpace<Dim>::FinerSpace(const Mesh<Dim>& coarse, int num_obstacle_vertices)
-    : revision(coarse.revision()), obstacle_vertices(num_obstacle_vertices), mesh(finer_mesh(coarse)) {
+    : revision(coarse.revision()),
+      obstacle_vertices(num_obstacle_vertices),
+      mesh(finer_mesh(coarse)),
+      map(find_weights(coarse), VectorX::Zero(Dim * (mesh.num_nodes() + obstacle_vertices))),
+      is_new(mesh.num_nodes() + obstacle_vertices, 1) {
+  for (const int fine : fine_of_coarse) is_new[fine] = 0;
+}
+
+/// Sets `fine_of_coarse`, too.
+template <int Dim>
+typename VertexMap<Dim>::Weights FinerSpace<Dim>::find_weights(const Mesh<Dim>& coarse) {
   const int rows = mesh.num_nodes() + obstacle_vertices, columns = coarse.num_nodes() + obstacle_vertices;
   std::vector<Weights> point(mesh.num_nodes());
   fine_of_coarse.assign(columns, kNone);
@@ -95,34 +106,27 @@ FinerSpace<Dim>::FinerSpace(const Mesh<Dim>& coarse, int num_obstacle_vertices)
     fine_of_coarse[coarse.num_nodes() + o] = mesh.num_nodes() + o;
     entries.emplace_back(mesh.num_nodes() + o, coarse.num_nodes() + o, 1.0);
   }
-  weights.resize(rows, columns);
+  typename VertexMap<Dim>::Weights weights(rows, columns);
   weights.setFromTriplets(entries.begin(), entries.end());
-  is_new.assign(rows, 1);
-  for (const int fine : fine_of_coarse) is_new[fine] = 0;
+  return weights;
 }
 
 template <int Dim>
-VectorX FinerSpace<Dim>::prolong(const VectorX& coarse) const {
-  VectorX fine(Dim * weights.rows());
-  fine.reshaped(Dim, weights.rows()) = coarse.reshaped(Dim, weights.cols()) * weights.transpose();
-  return fine;
-}
-template <int Dim>
 VectorX FinerSpace<Dim>::restrict(const VectorX& functional) const {
-  VectorX coarse(Dim * weights.cols());
-  coarse.reshaped(Dim, weights.cols()) = functional.reshaped(Dim, weights.rows()) * weights;
+  VectorX coarse = VectorX::Zero(Dim * static_cast<Eigen::Index>(fine_of_coarse.size()));
+  map.add_gradient(functional, coarse);
   return coarse;
 }
 template <int Dim>
 VectorX FinerSpace<Dim>::inject(const VectorX& coarse) const {
-  VectorX fine = VectorX::Zero(Dim * weights.rows());
+  VectorX fine = VectorX::Zero(Dim * static_cast<Eigen::Index>(is_new.size()));
   for (std::size_t node = 0; node < fine_of_coarse.size(); ++node)
     fine.template segment<Dim>(Dim * fine_of_coarse[node]) = coarse.template segment<Dim>(Dim * node);
   return fine;
 }
 template <int Dim>
 VectorX FinerSpace<Dim>::at_coarse_nodes(const VectorX& fine) const {
-  VectorX coarse(Dim * weights.cols());
+  VectorX coarse(Dim * static_cast<Eigen::Index>(fine_of_coarse.size()));
   for (std::size_t node = 0; node < fine_of_coarse.size(); ++node)
     coarse.template segment<Dim>(Dim * node) = fine.template segment<Dim>(Dim * fine_of_coarse[node]);
   return coarse;
@@ -135,19 +139,6 @@ enum class End { converged, slow, indefinite };
 
 std::span<double> span_of(VectorX& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 std::span<const double> span_of(const VectorX& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
-
-VectorX at_unknowns(const DofMap& dofs, const VectorX& all) {
-  VectorX unknowns(dofs.num_unknowns);
-  for (Eigen::Index i = 0; i < all.size(); ++i)
-    if (dofs.unknown[i] != kNone) unknowns[dofs.unknown[i]] = all[i];
-  return unknowns;
-}
-VectorX at_dofs(const DofMap& dofs, const VectorX& unknowns) {
-  VectorX all = VectorX::Zero(static_cast<Eigen::Index>(dofs.unknown.size()));
-  for (Eigen::Index i = 0; i < all.size(); ++i)
-    if (dofs.unknown[i] != kNone) all[i] = unknowns[dofs.unknown[i]];
-  return all;
-}
 
 /// A motion, of all dofs, that lowers a quadratic model of the energy, and by how much.
 struct Response {
@@ -222,13 +213,12 @@ std::string why_unknown(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
   return {};
 }
 
-/// Changes by d-hat, friction's velocity, lagging and the solver on the mesh itself, by ErrorSource. `problem` is as after
-/// the solve, and lagged at x then.
+/// Changes by d-hat, friction's velocity, lagging and the solver on the mesh itself, by ErrorSource. Gradients at x are
+/// those as the solve lagged (`before`), and as lagged at x (`now`).
 template <int Dim>
-std::array<Change, kErrorSources> find_changes(const StepSetup<Dim>& setup, StepProblem<Dim>& problem, const VectorX& x) {
-  const auto before = problem.gradients(x);
-  problem.lag_as(problem, x);
-  const auto now = problem.gradients(x);
+std::array<Change, kErrorSources> find_changes(const StepSetup<Dim>& setup, StepProblem<Dim>& problem, const VectorX& x,
+                                               const typename StepProblem<Dim>::Gradients& before,
+                                               const typename StepProblem<Dim>::Gradients& now) {
   std::array<Change, kErrorSources> changes;
   const auto of = [&](ErrorSource source) -> Change& { return changes[static_cast<std::size_t>(source)]; };
   for (Change& change : changes) change.all = change.contact = change.friction = VectorX::Zero(x.size());
@@ -435,16 +425,20 @@ template <int Dim>
 bool ErrorEstimator<Dim>::estimate_others(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem,
                                           const VectorX& x, const std::array<Change, kErrorSources>& changes,
                                           ErrorReport& report, ErrorFields& errors) {
-  const auto hessian = problem.assemble(x, PsdProjection::none).product();
+  NewtonSystem::Product product;
+  const auto hessian = [&](ConstVectorView v, VectorView Hv) {
+    if (!product) product = problem.assemble(x, PsdProjection::none).product();
+    product(v, Hv);
+  };
   const double nothing = kNothing * std::abs(problem.sum().value(x, problem.workspace()));
   for (std::size_t s = 1; s < changes.size(); ++s) {
     const Change& change = changes[s];
-    Response response;
+    Response response{VectorX::Zero(x.size())};
     const auto solve = [&] {
       const auto by_factor = [&](const VectorX& residual) { return precondition(residual); };
       return minimise(problem.dofs(), hessian, by_factor, change.all, nothing, kEnoughInContact, response);
     };
-    if (!try_factors(problem, x, report.no_bar, solve)) return false;
+    if (!change.all.isZero(0) && !try_factors(problem, x, report.no_bar, solve)) return false;
     // Where a source changes the energy itself, that is of first order, and the gain of second.
     report.energy[s] = (change.energy != 0 ? change.energy : -response.gain) / problem.scaling();
     ErrorFields::OfSource& fields = errors.sources[s];
@@ -467,8 +461,10 @@ ErrorFields ErrorEstimator<Dim>::estimate(const StepSetup<Dim>& setup, const Sta
     space_ = std::make_unique<FinerSpace<Dim>>(state.mesh, obstacles);
   ErrorFields errors;
   errors.sources.resize(kErrorSources);
-  const auto changes = find_changes(setup, problem, x);
+  const auto as_solved = problem.gradients(x);
+  problem.lag_as(problem, x);
   const auto at_x = problem.gradients(x);
+  const auto changes = find_changes(setup, problem, x, as_solved, at_x);
   if (!estimate_mesh(setup, state, problem, x, at_x, report, errors.sources[0]) ||
       !estimate_others(setup, state, problem, x, changes, report, errors)) {
     report.energy = {};

@@ -2,12 +2,12 @@
 // Estimates of what the results of a step are wrong by (docs/theory.md, "Error bars").
 #pragma once
 
-#include <Eigen/SparseCore>
 #include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "fem/vertex_map.hpp"
 #include "itr/frame.hpp"
 #include "itr/setup.hpp"
 #include "linear/reuse.hpp"
@@ -24,7 +24,7 @@ struct FinerSpace {
   FinerSpace(const Mesh<Dim>& mesh, int obstacle_vertices);
 
   /// Functions, or motions, in this space that are those of the mesh; fields are interleaved over nodes and obstacles.
-  VectorX prolong(const VectorX& coarse) const;
+  VectorX prolong(const VectorX& coarse) const { return map.motion(coarse); }
   History prolong(History history) const;
   /// The transposed of it.
   VectorX restrict(const VectorX& functional) const;
@@ -36,9 +36,12 @@ struct FinerSpace {
   std::uint64_t revision;  ///< of the coarse mesh
   int obstacle_vertices;
   Mesh<Dim> mesh;
-  Eigen::SparseMatrix<double, Eigen::RowMajor> weights;  ///< a row for each node here, a column for each coarse one
-  std::vector<int> fine_of_coarse;                       ///< node that is the same one
-  std::vector<char> is_new;                              ///< by node: no coarse one is there
+  std::vector<int> fine_of_coarse;  ///< node that is the same one
+  VertexMap<Dim> map;               ///< of coarse nodes to those here
+  std::vector<char> is_new;         ///< by node: no coarse one is there
+
+ private:
+  typename VertexMap<Dim>::Weights find_weights(const Mesh<Dim>& coarse);
 };
 
 /// Change of gradients and energy at a solution by a source of errors, scaled.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace itr {
@@ -23,6 +24,17 @@ int body_at(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Facet& facet) {
 }
 
 }  // namespace
+
+template <int Dim>
+EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
+  EdgeLengths lengths{.shortest = std::numeric_limits<double>::infinity()};
+  for (const auto& [a, b] : mesh.edges()) {
+    const double length = (mesh.rest(a) - mesh.rest(b)).norm();
+    lengths.shortest = std::min(lengths.shortest, length);
+    lengths.longest = std::max(lengths.longest, length);
+  }
+  return lengths;
+}
 
 template <int Dim>
 double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
@@ -91,6 +103,8 @@ std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
 
 template std::map<int, double> fractions_of_rounds(const Mesh<2>&);
 template std::map<int, double> fractions_of_rounds(const Mesh<3>&);
+template EdgeLengths edge_lengths(const Mesh<2>&);
+template EdgeLengths edge_lengths(const Mesh<3>&);
 template double facet_measure(const Mesh<2>&, FacetId);
 template double facet_measure(const Mesh<3>&, FacetId);
 template std::map<int, BodySize> body_sizes(const Mesh<2>&);

@@ -15,6 +15,13 @@ struct BodySize {
   double mean_edge = 0;            ///< of a cell of mean volume [m]
 };
 
+/// Edge lengths of a mesh at rest [m].
+struct EdgeLengths {
+  double shortest = 0, longest = 0;
+};
+template <int Dim>
+EdgeLengths edge_lengths(const Mesh<Dim>& mesh);
+
 /// Length or area of a boundary facet at rest [m], [m^2].
 template <int Dim>
 double facet_measure(const Mesh<Dim>& mesh, FacetId f);

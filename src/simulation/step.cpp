@@ -7,7 +7,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/energy_guard.hpp"
@@ -25,17 +25,6 @@
 #include "simulation/stability.hpp"
 
 namespace itr {
-
-template <int Dim>
-EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
-  EdgeLengths lengths{.shortest = std::numeric_limits<double>::infinity()};
-  for (const auto& [a, b] : mesh.edges()) {
-    const double length = (mesh.rest(a) - mesh.rest(b)).norm();
-    lengths.shortest = std::min(lengths.shortest, length);
-    lengths.longest = std::max(lengths.longest, length);
-  }
-  return lengths;
-}
 
 namespace {
 
@@ -124,12 +113,11 @@ class StepSolver {
         next_(before),
         x_(x_start),
         guard_(tools.setup, before),
-        must_settle_(may_cut && tools.setup.lagging_tolerance > 0),
-        is_of_setup_(attempt.method == StepMethod::of_setup),
-        trial_(attempt.trial) {
+        accuracy_(tools.setup, before, attempt),
+        must_settle_(may_cut && tools.setup.lagging_tolerance > 0) {
     next_.step = before.step + 1;
     next_.t = setup_.time.time_after(next_.step);
-    next_.history.damp_next = !is_of_setup_;
+    next_.history.damp_next = attempt.method != StepMethod::of_setup;
     report_.step = next_.step;
     report_.t = next_.t;
     report_.order = TimeIntegrator(setup_.time).accuracy(next_.history);
@@ -172,10 +160,10 @@ class StepSolver {
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
     next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
-    if (setup_.time.adaptive.enabled) {
+    if (accuracy_.is_on()) {
       report_.dt = setup_.time.dt;
-      report_.time_error = errors_.error;
-      next_.control = StepController(setup_.time).after(before_.control, errors_, trial_, setup_.time.dt, energy_);
+      report_.time_error = accuracy_.error();
+      next_.control = accuracy_.control();
     }
     if (tools_.errors) {
       const ScopedTimer timer(report_.errors.seconds);
@@ -215,11 +203,9 @@ class StepSolver {
   /// Ends a step that has failed.
   StepResult drop(const StepFailure& failure) {
     clock_.tell(report_);
-    if (setup_.time.adaptive.enabled) {
-      const bool is_error = failure.kind == StepFailure::Kind::inaccurate;
+    if (accuracy_.is_on()) {
       report_.rejected_steps = 1;
-      report_.rejections = {
-          {setup_.time.dt, is_error ? errors_.error : std::numeric_limits<double>::quiet_NaN(), failure.reason}};
+      report_.rejections = {accuracy_.rejection(failure)};
     }
     StepResult result{
         .ok = false, .reason = failure.reason, .report = report_, .forces = {}, .errors = {}, .renumbering = {}};
@@ -272,27 +258,12 @@ class StepSolver {
     return std::nullopt;
   }
 
-  /// Judges an adaptive step by its errors in time, on the mesh before it.
+  /// Judges an adaptive step after its first solve.
   std::optional<StepFailure> find_inaccuracy() {
-    if (!setup_.time.adaptive.enabled) return std::nullopt;
+    if (!accuracy_.is_on()) return std::nullopt;
     const ScopedTimer timer(report_.seconds.assembly);
     const auto phase = ScopedPhase::coarse("error in time");
-    const TimeErrors found = problem_->time_errors(next_.history, x_, first_summary_.iterations > 0);
-    energy_ = found.energy;
-    const double largest = std::max({before_.control.energy, energy_, problem_->energy_resolution()});
-    errors_ = {.error = std::sqrt(found.local / largest) + found.work / (2 * largest),
-               .impact = found.impact / largest,
-               .resolving_dt = found.resolving_dt,
-               .way_to_contact = found.way_to_contact};
-    if (!is_of_setup_) return std::nullopt;
-    const StepController controller(setup_.time);
-    const auto shorter = controller.shorter(errors_, trial_, setup_.time.dt, report_.order);
-    if (!shorter) return std::nullopt;
-    const bool is_impact = shorter->error == 0;
-    return StepFailure{.kind = StepFailure::Kind::inaccurate,
-                       .reason = is_impact ? "impact" : "error in time",
-                       .nearly_inverted = {},
-                       .trial = *shorter};
+    return accuracy_.find_inaccuracy(*problem_, next_.history, x_, first_summary_.iterations > 0);
   }
 
   void go_back_to_first_solve() {
@@ -499,11 +470,8 @@ class StepSolver {
   VectorX x_;  ///< the solution, on next_.mesh; before the first solve its start
   std::unique_ptr<StepProblem<Dim>> problem_;
   EnergyGuard<Dim> guard_;
+  AccuracyGuard<Dim> accuracy_;
   bool must_settle_;  ///< rounds of lagging, or the step is cut
-  bool is_of_setup_;  ///< the integrator that takes it
-  StepTrial trial_;   ///< of an adaptive step, and its errors
-  StepErrors errors_;
-  double energy_ = 0;  ///< at its end [J]
   MeshRenumbering renumbering_;
   StepReport report_;
   NewtonSummary first_summary_;
@@ -613,8 +581,7 @@ StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, Stat
   return result;
 }
 
-#define ITR_INSTANTIATE(Dim)                                \
-  template EdgeLengths edge_lengths<Dim>(const Mesh<Dim>&); \
+#define ITR_INSTANTIATE(Dim) \
   template StepResult take_step<Dim>(const StepTools<Dim>&, const State<Dim>&, State<Dim>&, State<Dim>*, Attempt);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

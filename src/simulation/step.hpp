@@ -3,28 +3,25 @@
 
 #include "itr/core.hpp"
 #include "simulation/error_estimator.hpp"
+#include "simulation/sizes.hpp"
 #include "simulation/state.hpp"
 #include "simulation/step_ladder.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
 
-/// Edge lengths of the mesh that a simulation begins with [m].
-struct EdgeLengths {
-  double shortest = 0, longest = 0;
-};
-template <int Dim>
-EdgeLengths edge_lengths(const Mesh<Dim>& mesh);
-
 /// Tools that all steps of a simulation share.
 template <int Dim>
 struct StepTools {
   const StepSetup<Dim>& setup;
-  EdgeLengths initial_edges;
+  EdgeLengths initial_edges;  ///< of the mesh that the simulation begins with
   ProblemCache<Dim>& cache;
   linear::ReusingSolver& solver;  ///< that of `cache`
   const Logger& logger;
   ErrorEstimator<Dim>* errors = nullptr;  ///< null: nobody asks for error bars
+
+  /// The same for a part of a step.
+  StepTools with(const StepSetup<Dim>& part) const { return {part, initial_edges, cache, solver, logger, errors}; }
 };
 
 /// One step of paper Algorithm 1: solve, remesh where that lowers the step's energy, project the history, solve again. If

@@ -84,7 +84,6 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
                                const Attempt& attempt, StepResult failed) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepSetup<Dim> half = halved(setup, before);
-  const StepTools<Dim> tools_of_half{half, tools.initial_edges, tools.cache, tools.solver, tools.logger, tools.errors};
   tools.logger.warning("the step to t = " + setup.units.text(failed.report.t, "s", 6) + " failed (" + failed.reason +
                        "), cutting it into two of " + setup.units.text(half.time.dt, "s", 6));
   State<Dim> part = before;
@@ -97,7 +96,7 @@ StepResult take_step_in_halves(const StepTools<Dim>& tools, const State<Dim>& be
   MeshRenumbering renumbering;
   int parts = 0;
   for (int i = 0; i < 2; ++i) {
-    StepResult result = take_step<Dim>(tools_of_half, part, part, nullptr, attempt);
+    StepResult result = take_step<Dim>(tools.with(half), part, part, nullptr, attempt);
     parts += std::max(1, result.report.cut_steps);
     result.report.add_effort(effort);
     if (!result.ok) return result;
@@ -128,8 +127,7 @@ StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& befo
   time.dt *= attempt.trial.part;
   time.adaptive.step_end = time.t0 + time.dt;
   scale_tolerances(shorter, attempt.trial.part);
-  const StepTools<Dim> tools_of_shorter{shorter, tools.initial_edges, tools.cache, tools.solver, tools.logger};
-  StepResult result = take_step<Dim>(tools_of_shorter, before, after, start, attempt);
+  StepResult result = take_step<Dim>(tools.with(shorter), before, after, start, attempt);
   add_dropped(std::move(failed.report), result.report);
   return result;
 }

@@ -11,6 +11,7 @@
 #include "diagnosis.hpp"
 #include "energy/follower.hpp"
 #include "energy/mapped.hpp"
+#include "fem/unknowns.hpp"
 #include "geometry/quadratic_validity.hpp"
 #include "itr/core.hpp"
 #include "newton/curvature.hpp"
@@ -175,10 +176,7 @@ VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
     curvature = find_negative_curvature_by_products(system(), assemble, unknowns, by_unknown).value_or(0);
   }
   if (!(curvature < 0)) return {};
-  VectorX direction = VectorX::Zero(x.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i)
-    if (dofs_.unknown[i] != kNone) direction[i] = by_unknown[dofs_.unknown[i]];
-  return direction;
+  return at_dofs(dofs_, by_unknown);
 }
 
 template <int Dim>
@@ -264,16 +262,16 @@ void StepProblem<Dim>::lag_as(const StepProblem& other, const VectorX& x) {
 
 template <int Dim>
 typename StepProblem<Dim>::Gradients StepProblem<Dim>::gradients(const VectorX& x) {
-  const auto of = [&](const auto& is_asked) {
+  const auto of = [&](ForceEntry entry) {
     EnergySum sum;
-    potential_.add_to(sum, lagged_, is_asked);
+    potential_.add_to(sum, lagged_, [=](const Traits& term) { return term.force == entry; });
     VectorX gradient = VectorX::Zero(x.size());
     sum.add_gradient(x, gradient, workspace_);
     return gradient;
   };
-  const auto of_entry = [&](ForceEntry entry) { return of([=](const Traits& term) { return term.force == entry; }); };
-  return {of([](const Traits&) { return true; }), of_entry(ForceEntry::contact), of_entry(ForceEntry::friction),
-          of_entry(ForceEntry::applied)};
+  Gradients found{of(ForceEntry::none), of(ForceEntry::contact), of(ForceEntry::friction), of(ForceEntry::applied)};
+  found.all += found.contact + found.friction + found.applied;
+  return found;
 }
 
 /// Pressures stay as they are where gaps shrink with d-hat: in the plain form they go with its third power.

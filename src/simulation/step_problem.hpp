@@ -142,7 +142,8 @@ class StepProblem {
   void smooth_friction_by(double motion);
   void find_local_error(const History& history, const VectorX& increment, const VectorX& contact, TimeErrors& errors);
   VectorX contact_gradient(const VectorX& x);
-  void find_impact(const History& history, const VectorX& x, const VectorX& v, TimeErrors& errors);
+  void find_impact(const History& history, const VectorX& x, const VectorX& v, const VectorX& before, const VectorX& now,
+                   TimeErrors& errors);
   void reset_system();
   SparseSystem& system();
   VectorX momentum(const VectorX& v) const;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "energy/incremental_potential.hpp"
+#include "fem/unknowns.hpp"
 #include "simulation/step_problem.hpp"
 
 namespace itr {
@@ -16,23 +17,11 @@ template <int Dim>
 void StepProblem<Dim>::find_local_error(const History& history, const VectorX& increment, const VectorX& contact,
                                         TimeErrors& errors) {
   const TimeIntegrator integrator(setup_.time);
-  const int unknowns = dofs_.num_unknowns;
-  const auto of_unknowns = [&](const VectorX& field) {
-    VectorX values(unknowns);
-    for (Eigen::Index i = 0; i < field.size(); ++i)
-      if (dofs_.unknown[i] != kNone) values[dofs_.unknown[i]] = field[i];
-    return values;
-  };
-  const auto mass_product = [&](const VectorX& values) {
-    VectorX field = VectorX::Zero(increment.size());
-    for (Eigen::Index i = 0; i < field.size(); ++i)
-      if (dofs_.unknown[i] != kNone) field[i] = values[dofs_.unknown[i]];
-    return of_unknowns(momentum(field));
-  };
+  const auto mass_product = [&](const VectorX& values) { return at_unknowns(dofs_, momentum(at_dofs(dofs_, values))); };
   if (!terms_.has_inertia) {
     const double h = setup_.time.dt, chord = 4 * (1 + history.dt / h);
-    const VectorX d = of_unknowns((increment - h * history.v[0]) / chord);
-    VectorX force(unknowns);
+    const VectorX d = at_unknowns(dofs_, (increment - h * history.v[0]) / chord);
+    VectorX force(dofs_.num_unknowns);
     system().product()(d, force);
     errors.local = 0.5 * std::max(0.0, d.dot(force)) / terms_.scaling;
     return;
@@ -40,13 +29,14 @@ void StepProblem<Dim>::find_local_error(const History& history, const VectorX& i
   const LocalError error = integrator.local_error(increment, history);
   const auto filtered = [&](const VectorX& e) {
     constexpr double kDigits = 1e-3;
-    VectorX force = mass_product(of_unknowns(e)), f(unknowns);
+    const VectorX values = at_unknowns(dofs_, e);
+    VectorX force = mass_product(values), f(values.size());
     for (Eigen::Index i = 0; i < contact.size(); ++i)
       if (contact[i] != 0 && dofs_.unknown[i] != kNone) force[dofs_.unknown[i]] = 0;
     linear::Asked asked{.residual = kDigits};
     asked.if_indefinite = true;
     const bool is_solved = system().solve(0, force, asked, f).outcome == linear::Outcome::ok && f.allFinite();
-    return is_solved ? std::pair(force, f) : std::pair(force, of_unknowns(e));
+    return is_solved ? std::pair(force, f) : std::pair(force, values);
   };
   const auto [force, f] = filtered(error.x);
   errors.local = std::max(0.0, f.dot(force - mass_product(f)) / (2 * terms_.scaling));
@@ -54,7 +44,7 @@ void StepProblem<Dim>::find_local_error(const History& history, const VectorX& i
   EnergySum sum;
   potential_.add_to(sum, lagged_, [](const Traits& term) { return term.kind == TermKind::loads; });
   sum.add_gradient(base_ + increment, loads, workspace_);
-  errors.work = std::abs(f.dot(of_unknowns(loads))) / terms_.scaling;
+  errors.work = std::abs(f.dot(at_unknowns(dofs_, loads))) / terms_.scaling;
   if (error.v.size() == 0) return;
   const VectorX f_v = filtered(error.v).second;
   errors.local += 0.5 * f_v.dot(mass_product(f_v));
@@ -67,11 +57,12 @@ VectorX StepProblem<Dim>::contact_gradient(const VectorX& x) {
   return gradient;
 }
 
-/// Nodes that no contact force acted on before the step, and that one has stopped in its direction.
+/// Nodes that no contact force acted on before the step, and that one has stopped in its direction. Gradients of contact are
+/// those before the step and at x.
 template <int Dim>
-void StepProblem<Dim>::find_impact(const History& history, const VectorX& x, const VectorX& v, TimeErrors& errors) {
+void StepProblem<Dim>::find_impact(const History& history, const VectorX& x, const VectorX& v, const VectorX& before,
+                                   const VectorX& now, TimeErrors& errors) {
   const VectorX &x0 = history.x[0], &v0 = history.v[0];
-  const VectorX before = contact_gradient(x0), now = contact_gradient(x);
   VectorX stopped = VectorX::Zero(x.size());
   double fastest = 0;
   for (Eigen::Index i = 0; i < x.size(); i += Dim) {
@@ -104,19 +95,22 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
     PrescribedMotion none;
     system().assemble(potential_.sum(lagged_), x, PsdProjection::clamp, dofs_, none, workspace_);
   }
-  VectorX contact;  // not 0 on nodes that it acts on
-  if (terms_.has_inertia && potential_.contact()) {
-    contact = contact_gradient(x).cwiseAbs();
-    for (const VectorX& past : history.x) contact += contact_gradient(past).cwiseAbs();
+  if (!terms_.has_inertia || !potential_.contact()) {
+    find_local_error(history, increment, {}, errors);
+    return errors;
   }
-  find_local_error(history, increment, contact, errors);
-  if (terms_.has_inertia && potential_.contact()) find_impact(history, x, v, errors);
+  const VectorX now = contact_gradient(x), before = contact_gradient(history.x[0]);
+  VectorX acted_on = now.cwiseAbs() + before.cwiseAbs();
+  for (std::size_t age = 1; age < history.x.size(); ++age) acted_on += contact_gradient(history.x[age]).cwiseAbs();
+  find_local_error(history, increment, acted_on, errors);
+  find_impact(history, x, v, before, now, errors);
   return errors;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                     \
   template void StepProblem<Dim>::find_local_error(const History&, const VectorX&, const VectorX&, TimeErrors&); \
-  template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, TimeErrors&);      \
+  template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, const VectorX&,    \
+                                              const VectorX&, TimeErrors&);                                      \
   template TimeErrors StepProblem<Dim>::time_errors(const History&, const VectorX&, bool);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Compares adaptive steps with constant ones: error against Newton iterations and processor seconds, on fixed meshes.
 
-python3 verification/adaptive/run.py [--itr build/release/bin/itr] [--only NAME] [--scenes /work/shared/paper-scenes/scripts]
+python3 verification/adaptive/run.py [--itr build/release/bin/itr] [--only NAME] [--shared ../shared]
 
 Each scene is run by BDF2 with constant steps, with adaptive ones of several tolerances, and with steps several times shorter
 than the shortest of these as the reference. `error` is that of displacements at 20 asked times (root mean square over bodies
@@ -176,7 +176,7 @@ def compare(itr, name, case, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--itr", type=pathlib.Path, default=ROOT / "build/release/bin/itr")
-    parser.add_argument("--scenes", type=pathlib.Path, default=ROOT.parent / "shared/paper-scenes/scripts")
+    parser.add_argument("--shared", type=pathlib.Path, default=ROOT.parent / "shared")
     parser.add_argument("--only")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the runs; they are removed without")
     options = parser.parse_args()
@@ -189,7 +189,7 @@ def main():
         if options.only and path.exists():
             with open(path, newline="") as file:
                 old = [row for row in csv.DictReader(file) if row["scene"] != options.only]
-        rows = [row for name, case in cases(folder, options.scenes).items() if options.only in (None, name)
+        rows = [row for name, case in cases(folder, options.shared / "paper-scenes/scripts").items() if options.only in (None, name)
                 for row in compare(options.itr.resolve(), name, case, folder)]
         for row in rows:
             row["commit"] = stored.made("verification/adaptive/results.csv")
