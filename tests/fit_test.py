@@ -108,6 +108,7 @@ class FitTest(unittest.TestCase):
         refused("stretch,stress\n1,0\n2,x\n", "row 2", "2, x")
         refused("stretch,stress\n1,0\n2\n", "row 2")
         refused("strain,stress\n0,0\n-1.5,-3\n", "-1.5", "stretch > 0")
+        refused("stretch,stress\n1,0\n2,0\n", "stress", "0 in all rows")
         self.assertIn("--uniaxial", self.fit("Yeoh", status=2)[1].stderr)
         self.assertIn("invalid choice", self.fit("SaintVenant", status=2)[1].stderr)
         self.assertIn("no-such.csv", self.fit("Yeoh", "--planar", "no-such.csv", status=2)[1].stderr)

@@ -85,9 +85,10 @@ class Sweep(unittest.TestCase):
 
     def test_refuses_another_sweep_in_its_folder(self):
         self.plan("--vary", "/materials/0/E=1e6,2e6")
-        refused = sweep(SCENE, "-o", self.folder, *SMALL, "--vary", "/materials/0/E=1e6,3e6", status=2)
-        self.assertIn("another sweep", refused.stderr)
-        self.assertIn("sweep.json", refused.stderr)
+        for others in (["/materials/0/E=1e6,3e6"], ["/materials/0/E=1e6,2e6", "--defaults", "polyfem"]):
+            refused = sweep(SCENE, "-o", self.folder, *SMALL, "--vary", *others, status=2)
+            self.assertIn("another sweep", refused.stderr)
+            self.assertIn("sweep.json", refused.stderr)
 
     def test_refuses_what_it_cannot_read(self):
         for words, text in ((["--vary", "E=1,2"], "expected /json/pointer="), (["--vary", "/a="], "values between the commas"),

@@ -274,24 +274,19 @@ itr_status itr_fix_values(itr_simulation* simulation, const char* boundary, cons
     s.fix(boundary, array("mask", mask, dimension_of(simulation)), array("displacements", displacements, length));
   });
 }
-itr_status itr_set_traction(itr_simulation* simulation, const char* boundary, itr_function traction, void* user) {
-  return with_boundary(simulation, boundary,
-                       [&](itr::AnySimulation& s) { s.set_traction(boundary, as_function(traction, user)); });
-}
-itr_status itr_set_traction_values(itr_simulation* simulation, const char* boundary, size_t length,
-                                   const double* tractions) {
-  return with_boundary(simulation, boundary,
-                       [&](itr::AnySimulation& s) { s.set_traction(boundary, array("tractions", tractions, length)); });
-}
-itr_status itr_set_pressure(itr_simulation* simulation, const char* boundary, itr_function pressure, void* user) {
-  return with_boundary(simulation, boundary,
-                       [&](itr::AnySimulation& s) { s.set_pressure(boundary, as_function(pressure, user)); });
-}
-itr_status itr_set_pressure_values(itr_simulation* simulation, const char* boundary, size_t length,
-                                   const double* pressures) {
-  return with_boundary(simulation, boundary,
-                       [&](itr::AnySimulation& s) { s.set_pressure(boundary, array("pressures", pressures, length)); });
-}
+// Loads on a boundary, by a function or by values at its vertices.
+#define ITR_LOAD(FUNCTION, NAME, SET)                                                                       \
+  itr_status FUNCTION(itr_simulation* simulation, const char* boundary, itr_function NAME, void* user) {    \
+    return with_boundary(simulation, boundary, [&](auto& s) { s.SET(boundary, as_function(NAME, user)); }); \
+  }
+#define ITR_LOAD_VALUES(FUNCTION, NAME, SET)                                                                   \
+  itr_status FUNCTION(itr_simulation* simulation, const char* boundary, size_t length, const double* NAME) {   \
+    return with_boundary(simulation, boundary, [&](auto& s) { s.SET(boundary, array(#NAME, NAME, length)); }); \
+  }
+ITR_LOAD(itr_set_traction, traction, set_traction)
+ITR_LOAD_VALUES(itr_set_traction_values, tractions, set_traction)
+ITR_LOAD(itr_set_pressure, pressure, set_pressure)
+ITR_LOAD_VALUES(itr_set_pressure_values, pressures, set_pressure)
 itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user) {
   return with(simulation, [&](itr::AnySimulation& s) { s.set_acceleration(as_function(acceleration, user)); });
 }

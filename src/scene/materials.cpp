@@ -217,8 +217,10 @@ class SumReader {
     requirements_.push_back(requirement_of(node, {length(Vec<3>::Zero()), varies ? length : SpaceFunction()}, is_positive,
                                            "a direction of length > 0"));
     return [at, wanted = requirements_.back()](const Vec<3>& X) {
-      if (wanted.value.function) wanted.check(X);
-      return Vec<3>(at(X).normalized());
+      const Vec<3> direction = at(X);
+      const double length = direction.norm();
+      if (!(length > 0 && std::isfinite(length))) wanted.check(X);
+      return Vec<3>(direction / length);
     };
   }
 

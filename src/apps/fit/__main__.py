@@ -53,21 +53,15 @@ def read_table(path, names):
     if not pair:
         fail(f"{path}: first line", ", ".join(header) or "nothing", " or ".join(" and ".join(pair) for pair in names))
     columns = [header.index(name) for name in pair]
-    try:
-        values = np.array([[float(row[c]) for c in columns] for row in rows[1:]])
-    except (ValueError, IndexError):
-        bad = next(i for i, row in enumerate(rows[1:]) if not is_row(row, columns))
-        fail(f"{path}: row {bad + 1} below the first", ", ".join(rows[bad + 1]), f"numbers of {' and '.join(pair)}")
+    values = []
+    for number, row in enumerate(rows[1:], start=1):
+        try:
+            values.append([float(row[c]) for c in columns])
+        except (ValueError, IndexError):
+            fail(f"{path}: row {number} below the first", ", ".join(row), f"numbers of {' and '.join(pair)}")
     if len(values) < 2 or not np.isfinite(values).all():
         fail(path, f"{len(values)} rows", "two or more of finite numbers")
-    return values.T, pair
-
-
-def is_row(row, columns):
-    try:
-        return bool([float(row[c]) for c in columns])
-    except (ValueError, IndexError):
-        return False
+    return np.transpose(values), pair
 
 
 def read_tests(options):
@@ -78,6 +72,8 @@ def read_tests(options):
             stretch = first + 1 if pair[0] == "strain" else first
             if stretch.min() <= 0:
                 fail(f"{path}: {pair[0]}", f"{first.min():g}", "a stretch > 0")
+            if not stress.any():
+                fail(f"{path}: stress", "0 in all rows", "a stress that is not 0")
             tests[test] = stretch, stress
     if not tests:
         fail("itr fit", "no test of shear", "one or more of --uniaxial, --biaxial, --planar")
@@ -112,7 +108,7 @@ class Fit:
 
     def __init__(self, responses, law, tests, terms):
         self.responses, self.law, self.tests, self.terms = responses, law, tests, terms
-        self.scales = {test: np.sqrt(np.mean(stress**2) * len(stress)) for test, (_, stress) in tests.items()}
+        self.scales = {test: np.linalg.norm(stress) for test, (_, stress) in tests.items()}
         self.target = np.concatenate([stress / self.scales[test] for test, (_, stress) in tests.items()])
 
     def model(self, linear, others):
@@ -129,11 +125,8 @@ class Fit:
         # A little of the coefficients' size is added, so that columns that hardly differ do not cancel.
         size = np.linalg.norm(columns, axis=0)
         size[size == 0] = 1
-        padded = np.vstack([columns / size, 1e-6 * np.eye(count)])
-        if self.law.is_positive:
-            scaled = nnls(padded, np.concatenate([self.target, np.zeros(count)]))[0]
-        else:
-            scaled = np.linalg.lstsq(padded, np.concatenate([self.target, np.zeros(count)]), rcond=None)[0]
+        padded = np.vstack([columns / size, 1e-6 * np.eye(count)]), np.concatenate([self.target, np.zeros(count)])
+        scaled = nnls(*padded)[0] if self.law.is_positive else np.linalg.lstsq(*padded, rcond=None)[0]
         return scaled / size, columns @ (scaled / size) - self.target
 
     def best(self):
@@ -184,9 +177,11 @@ def softening(responses, material):
 
 
 def words_of(place, low, high):
-    if place.endswith("tension"):
-        return f"in {place} from a stretch of {low:.3g} on" if high >= CHECKED[-1] else f"in {place} at stretches of {low:.3g} to {high:.3g}"
-    return f"in {place} below a stretch of {high:.3g}" if low <= CHECKED[0] else f"in {place} at stretches of {low:.3g} to {high:.3g}"
+    if place.endswith("tension") and high >= CHECKED[-1]:
+        return f"in {place} from a stretch of {low:.3g} on"
+    if place.endswith("compression") and low <= CHECKED[0]:
+        return f"in {place} below a stretch of {high:.3g}"
+    return f"in {place} at stretches of {low:.3g} to {high:.3g}"
 
 
 def draw(path, responses, material, tests, soft):

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -14,10 +13,10 @@
 #include <utility>
 
 #include "core/connected_parts.hpp"
-#include "geometry/measures.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "long_steps.hpp"
+#include "mesh_figures.hpp"
 #include "resolution.hpp"
 #include "simulation/barrier_stiffness.hpp"
 #include "simulation/incoming_state.hpp"
@@ -114,7 +113,6 @@ void find_contradictions(const Setup<Dim>& setup, std::vector<std::string>& foun
 }
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSliver = 0.1;                  ///< quality below which an element is one
 constexpr double kLargeRatio = 1e3;              ///< of element sizes, from which systems are hard
 constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
 constexpr double kLargePart = 5;                 ///< of what touches or falls [m]: above it lengths may be millimetres
@@ -133,40 +131,15 @@ std::string vector_text(const Vec<Dim>& v) {
   return "(" + text + ")";
 }
 
+/// Least and greatest Young's modulus of the bodies [Pa].
 template <int Dim>
-struct MeshFigures {
-  double shortest = kInfinity, longest = 0, worst_quality = 1, size = 0;
-  CellId worst_cell = 0;
-  int slivers = 0;
-  Vec<Dim> center = Vec<Dim>::Zero();
-
-  explicit MeshFigures(const Mesh<Dim>& mesh) {
-    for (const auto& [a, b] : mesh.edges()) {
-      const double length = (mesh.rest(a) - mesh.rest(b)).norm();
-      shortest = std::min(shortest, length);
-      longest = std::max(longest, length);
-    }
-    Eigen::AlignedBox<double, Dim> box;
-    for (const CellId c : mesh.live_cells()) {
-      std::array<Vec<Dim>, Dim + 1> corners;
-      for (int i = 0; i <= Dim; ++i) box.extend(corners[i] = mesh.rest(mesh.cell(c)[i]));
-      const double quality = simplex_quality<Dim>(corners);
-      slivers += quality < kSliver;
-      if (quality < worst_quality) worst_quality = quality, worst_cell = c;
-    }
-    size = box.sizes().maxCoeff();
-    const Vec<Dim> middle = box.center();  // may lie outside of the bodies, where loads need not be defined
-    center = mesh.rest(0);
-    for (const VertexId v : mesh.live_vertices())
-      if ((mesh.rest(v) - middle).norm() < (center - middle).norm()) center = mesh.rest(v);
+std::pair<double, double> range_of_moduli(const Setup<Dim>& setup, const MeshFigures<Dim>& figures) {
+  double softest = kInfinity, stiffest = 0;
+  for (const auto& [body, of_body] : figures.bodies) {
+    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
+    stiffest = std::max(stiffest, setup.materials.at(body).youngs_modulus);
   }
-};
-
-template <int Dim>
-std::map<int, double> volumes_by_body(const Mesh<Dim>& mesh) {
-  std::map<int, double> volumes;
-  for (const CellId c : mesh.live_cells()) volumes[mesh.body(c)] += mesh.volume(c);
-  return volumes;
+  return {softest, stiffest};
 }
 
 template <int Dim>
@@ -181,7 +154,7 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
                           "\"mm\", for a whole scene /units/length)",
                           figures.size));
   const bool has_mass = setup.time.has_inertia() || setup.body_acceleration;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
+  for (const auto& [body, of_body] : figures.bodies) {
     const Material& material = setup.materials.at(body);
     if (is_outside(material.youngs_modulus, kUsualModulus))
       found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", set_text(setup.names.bodies, body),
@@ -212,14 +185,10 @@ void find_hard_meshes(const MeshFigures<Dim>& figures, std::vector<std::string>&
 
 /// Newton takes the fewest iterations where the barrier is about as stiff as the bodies (verification/newton).
 template <int Dim>
-void find_odd_stiffness(const Setup<Dim>& setup, std::vector<std::string>& found) {
+void find_odd_stiffness(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& found) {
   const ContactOptions& contact = setup.contact;
   if (!contact.enabled || contact.adaptive_stiffness || !(contact.barrier_stiffness > 0)) return;
-  double softest = kInfinity, stiffest = 0;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
-    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
-    stiffest = std::max(stiffest, setup.materials.at(body).youngs_modulus);
-  }
+  const auto [softest, stiffest] = range_of_moduli(setup, figures);
   const double low = barrier_stiffness_for(setup, contact, softest), high = barrier_stiffness_for(setup, contact, stiffest);
   if (contact.barrier_stiffness >= low / kStiffnessRange && contact.barrier_stiffness <= kStiffnessRange * high) return;
   const bool is_stiff = contact.barrier_stiffness > high;
@@ -411,20 +380,18 @@ template <int Dim>
 bool has_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, double wave_speed) {
   constexpr double kStrain = 1e-3;
   if (driven_speed(setup, figures.size, figures.center) > kStrain * wave_speed) return true;
-  double softest = kInfinity;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh))
-    softest = std::min(softest, setup.materials.at(body).youngs_modulus);
+  const double strong = kStrain * range_of_moduli(setup, figures).first;
   const double t = setup.time.t0 + setup.time.dt;  // what is there at once
   return std::any_of(setup.neumann.begin(), setup.neumann.end(),
-                     [&](const auto& c) { return c.traction(figures.center, t).norm() > kStrain * softest; }) ||
+                     [&](const auto& c) { return c.traction(figures.center, t).norm() > strong; }) ||
          std::any_of(setup.pressure.begin(), setup.pressure.end(),
-                     [&](const auto& c) { return std::abs(c.pressure(figures.center, t)) > kStrain * softest; });
+                     [&](const auto& c) { return std::abs(c.pressure(figures.center, t)) > strong; });
 }
 
 template <int Dim>
 void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, std::vector<std::string>& words) {
   double speed = 0;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
+  for (const auto& [body, of_body] : figures.bodies) {
     const Material& m = setup.materials.at(body);
     speed = std::max(speed, std::sqrt((m.lame_lambda(Dim) + 2 * m.lame_mu()) / m.density));
   }
@@ -464,7 +431,7 @@ std::vector<std::string> find_suspicious(const Simulation<Dim>& simulation) {
   find_held(setup, found);
   find_contradictions(setup, found);
   find_held_loads(setup, found);
-  find_odd_stiffness(setup, found);
+  find_odd_stiffness(setup, figures, found);
   find_loose_bodies(setup, found);
   find_locking(setup, found);
   find_loose_tolerance(simulation, found);
@@ -479,13 +446,11 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
   const MeshFigures<Dim> figures(setup.mesh);
   const Units& units = setup.units;
   std::vector<std::string> words;
-  double mass = 0, softest = kInfinity, stiffest = 0;
+  double mass = 0;
   std::set<bool> plane_strain;
-  for (const auto& [body, volume] : volumes_by_body(setup.mesh)) {
+  for (const auto& [body, of_body] : figures.bodies) {
     const Material& material = setup.materials.at(body);
-    mass += material.density * volume;
-    softest = std::min(softest, material.youngs_modulus);
-    stiffest = std::max(stiffest, material.youngs_modulus);
+    mass += material.density * of_body.volume;
     plane_strain.insert(material.plane_strain);
   }
   if (Dim == 2)
@@ -500,6 +465,7 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
                       ? "bodies accelerate by " + vector_text<Dim>(acceleration / units.factor("m/s^2")) + " " +
                             units.name("m/s^2") + " (at their centre, at the start)"
                       : std::string("no gravity"));
+  const auto [softest, stiffest] = range_of_moduli(setup, figures);
   words.push_back(fmt::format("total mass {}, weight {}; moduli {:.4g} to {}", units.text(mass, "kg"),
                               units.text(mass * acceleration.norm(), "N"), units.from_si(softest, "Pa"),
                               units.text(stiffest, "Pa")));

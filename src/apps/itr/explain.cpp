@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -17,6 +16,7 @@
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "mesh/rest_box.hpp"
+#include "mesh_figures.hpp"
 #include "simulation/barrier_stiffness.hpp"
 #include "simulation/named.hpp"
 #include "simulation/state.hpp"
@@ -103,28 +103,11 @@ class Explanation {
   }
 
   void bodies() {
-    struct Sum {
-      int cells = 0;
-      double volume = 0;
-    };
-    std::map<int, Sum> sums;
-    double worst = 1, shortest = std::numeric_limits<double>::infinity(), longest = 0;
-    CellId worst_cell = 0;
     const Mesh<Dim>& mesh = setup_.mesh;
-    for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-      Sum& sum = sums[mesh.body(c)];
-      ++sum.cells;
-      sum.volume += mesh.volume(c);
-      if (mesh.quality(c) < worst) worst = mesh.quality(c), worst_cell = c;
-    }
-    for (const auto& [a, b] : mesh.edges()) {
-      const double length = (mesh.rest(a) - mesh.rest(b)).norm();
-      shortest = std::min(shortest, length);
-      longest = std::max(longest, length);
-    }
+    const MeshFigures<Dim> figures(mesh);
     const Units& units = setup_.units;
     fmt::print("bodies ({}D)\n", Dim);
-    for (const auto& [id, sum] : sums) {
+    for (const auto& [id, sum] : figures.bodies) {
       const Material& material = setup_.materials.at(id);
       const auto order = setup_.order.find(id);
       const std::string name = set_text(setup_.names.bodies, id);
@@ -138,8 +121,8 @@ class Explanation {
                  units.text(material.density * sum.volume, "kg"));
     }
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {}, worst quality {:.3g} (1: regular; element {})\n",
-               mesh.num_vertices(), mesh.num_cells(), units.from_si(shortest, "m"), units.text(longest, "m"), worst,
-               worst_cell);
+               mesh.num_vertices(), mesh.num_cells(), units.from_si(figures.shortest, "m"), units.text(figures.longest, "m"),
+               figures.worst_quality, figures.worst_cell);
     if (const Mesh<Dim>& curved = simulation_.state().mesh; curved.has_nodes())
       fmt::print(
           "  {} of {} edges are curved and carry a node: {} nodes in all; elasticity by {} points a cell with curved "

@@ -109,7 +109,8 @@ def plan(itr, options):
     if not os.path.exists(options.scene):
         fail(f"{options.scene}: no such file; expected a scene")
     runs = combinations_of([read_variation(text) for text in options.vary])
-    described = {"scene": os.path.abspath(options.scene), "set": options.set, "runs": runs}
+    described = {"scene": os.path.abspath(options.scene), "set": options.set, "solver": options.solver, "defaults": options.defaults,
+                 "runs": runs}
     known = folder / "sweep.json"
     if known.exists() and json.loads(known.read_text()) != described:
         fail(f"{known}: another sweep; expected another folder (-o), or the same scene and values to go on")
