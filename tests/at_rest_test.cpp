@@ -179,6 +179,27 @@ TEST(AtRest, StiffBodiesCarrySmallLoads) {
   }
 }
 
+/// The guess for each step is wrong by less than what the forces' round-off may hide, and by much more than positions do.
+TEST(AtRest, VelocitiesUnderAGrowingLoadAreThoseOfTheirSteps) {
+  itr::Setup<2> setup;
+  setup.mesh = make_square(3, 5);
+  setup.materials[1] = {.youngs_modulus = 1.38e4, .poisson_ratio = 0.45, .density = 2700};
+  hold(setup, 1);
+  setup.neumann.push_back({3, [](const Vec<2>&, double t) { return Vec<2>(1e-8 * t, 0); }});
+  setup.time = {.integrator = Integrator::implicit_euler, .dt = 6.43, .steps = 14};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  while (!simulation.finished()) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const History& history = simulation.state().history;
+    const Eigen::Map<const VectorX> rest(setup.mesh.rest()[0].data(), history.x[0].size());
+    const VectorX mean = (history.x[0] - rest) / result.report.t;
+    if (result.report.step > 4)
+      EXPECT_LE((history.v[0] - mean).lpNorm<Eigen::Infinity>(), 1e-3 * mean.lpNorm<Eigen::Infinity>());
+  }
+}
+
 TEST(AtRest, ASteelCubeStandsUnderItsWeight) {
   for (const double size : {1e-2, 1e-3, 1e-4}) {
     SCOPED_TRACE(size);

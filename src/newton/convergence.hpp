@@ -110,7 +110,9 @@ class Convergence {
     const double now = at_.gradient_norm();
     still_ = unresolved_ > 1 && now > kShrunk * last_shrunk_ ? still_ + 1 : 0;
     if (still_ == 0) last_shrunk_ = now;
-    return now <= kFloor * at_.gradient_round_off() || still_ >= kMostStill || unresolved_ >= kMostUnresolved;
+    const bool is_visible = is_first() && step.direction.cwiseAbs().maxCoeff() > kFloor * task_.extras.position_round_off;
+    return (!is_visible && now <= kFloor * at_.gradient_round_off()) || still_ >= kMostStill ||
+           unresolved_ >= kMostUnresolved;
   }
 
   const Task& task_;

@@ -43,7 +43,7 @@ class AccuracyGuard {
   }
   /// The local error of the step that was last judged, by what the largest energy so far gives.
   double error() const { return errors_.error; }
-  /// What the length of the next step follows from, if this one stands.
+  /// Controls the length of the next step, if this one stands.
   StepControl control() const { return StepController(time_).after(before_, errors_, attempt_.trial, time_.dt, energy_); }
   /// Describes the step where it failed.
   RejectedStep rejection(const StepFailure& failure) const {

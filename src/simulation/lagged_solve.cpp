@@ -219,7 +219,8 @@ class LaggedSolve {
     if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
     NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
                         .on_iteration = setup_.on_iteration,
-                        .must_be_minimum = !terms_.has_inertia};
+                        .must_be_minimum = !terms_.has_inertia,
+                        .position_round_off = std::numeric_limits<double>::epsilon() * base_.cwiseAbs().maxCoeff()};
     if (step_to_start.size() > 0) {
       extras.gradient_of_step = VectorX::Zero(x.size());
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);

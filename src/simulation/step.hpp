@@ -20,7 +20,7 @@ struct StepTools {
   const Logger& logger;
   ErrorEstimator<Dim>* errors = nullptr;  ///< null: nobody asks for error bars
 
-  /// The same for a part of a step.
+  /// Tools for a part of a step.
   StepTools with(const StepSetup<Dim>& part) const { return {part, initial_edges, cache, solver, logger, errors}; }
 };
 
