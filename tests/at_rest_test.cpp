@@ -33,26 +33,31 @@ void hold(Setup<Dim>& setup, int tag) {
   setup.dirichlet.push_back(condition);
 }
 
-/// Twenty by one squares of 1 mm, each cut in two, held on the left.
-Setup<2> cantilever(double modulus) {
-  constexpr int kLength = 20;
-  constexpr double kSize = 1e-3;
+/// nx by ny rectangles, each cut in two; their left side is 1, the right one 3, the others 4.
+Mesh<2> rectangles(int nx, int ny, double dx, double dy) {
   std::vector<Vec<2>> rest;
   std::vector<std::array<int, 3>> cells;
-  for (int j = 0; j <= 1; ++j)
-    for (int i = 0; i <= kLength; ++i) rest.emplace_back(kSize * i, kSize * j);
-  for (int i = 0; i < kLength; ++i) {
-    const int a = i, b = i + 1, c = kLength + 2 + i, d = kLength + 1 + i;
-    cells.push_back({a, b, c});
-    cells.push_back({a, c, d});
+  for (int j = 0; j <= ny; ++j)
+    for (int i = 0; i <= nx; ++i) rest.emplace_back(dx * i, dy * j);
+  for (int j = 0; j < ny; ++j)
+    for (int i = 0; i < nx; ++i) {
+      const int a = (nx + 1) * j + i, b = a + 1, c = b + nx + 1, d = c - 1;
+      cells.push_back({a, b, c});
+      cells.push_back({a, c, d});
+    }
+  Mesh<2> mesh(rest, cells, std::vector<int>(cells.size(), 1));
+  for (int f = 0; f < mesh.facet_slots(); ++f) {
+    const auto [a, b] = mesh.facet(f);
+    const double x = (mesh.rest(a)[0] + mesh.rest(b)[0]) / 2;
+    mesh.set_facet_tag(f, x < 1e-6 * dx ? 1 : x > dx * (nx - 1e-6) ? 3 : 4);
   }
+  return mesh;
+}
+
+/// Twenty by one squares of 1 mm, held on the left.
+Setup<2> cantilever(double modulus) {
   Setup<2> setup;
-  setup.mesh = Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
-  for (int f = 0; f < setup.mesh.facet_slots(); ++f) {
-    const auto [a, b] = setup.mesh.facet(f);
-    const double x = (setup.mesh.rest(a)[0] + setup.mesh.rest(b)[0]) / 2;
-    setup.mesh.set_facet_tag(f, x < 1e-9 ? 1 : x > kSize * kLength - 1e-9 ? 3 : 4);
-  }
+  setup.mesh = rectangles(20, 1, 1e-3, 1e-3);
   setup.materials[1] = {.youngs_modulus = modulus, .poisson_ratio = 0.35, .density = 1200};
   hold(setup, 1);
   return setup;
@@ -182,10 +187,12 @@ TEST(AtRest, StiffBodiesCarrySmallLoads) {
 /// The guess for each step is wrong by less than what the forces' round-off may hide, and by much more than positions do.
 TEST(AtRest, VelocitiesUnderAGrowingLoadAreThoseOfTheirSteps) {
   itr::Setup<2> setup;
-  setup.mesh = make_square(3, 5);
-  setup.materials[1] = {.youngs_modulus = 1.38e4, .poisson_ratio = 0.45, .density = 2700};
+  setup.mesh = rectangles(3, 2, 1.7210480736562235, 1.806160334454984);
+  setup.materials[1] = {
+      .law = MaterialLaw::fixed_corotated, .youngs_modulus = 1.3816e4, .poisson_ratio = 0.45, .density = 2700};
   hold(setup, 1);
-  setup.neumann.push_back({3, [](const Vec<2>&, double t) { return Vec<2>(1e-8 * t, 0); }});
+  setup.pressure.push_back({3, [](const Vec<2>&, double t) { return -1.1811271925804428e-06 / 90.02 * t; }});
+  setup.linear.solvers = {"eigen:lu"};
   setup.time = {.integrator = Integrator::implicit_euler, .dt = 6.43, .steps = 14};
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
@@ -195,8 +202,8 @@ TEST(AtRest, VelocitiesUnderAGrowingLoadAreThoseOfTheirSteps) {
     const History& history = simulation.state().history;
     const Eigen::Map<const VectorX> rest(setup.mesh.rest()[0].data(), history.x[0].size());
     const VectorX mean = (history.x[0] - rest) / result.report.t;
-    if (result.report.step > 4)
-      EXPECT_LE((history.v[0] - mean).lpNorm<Eigen::Infinity>(), 1e-3 * mean.lpNorm<Eigen::Infinity>());
+    if (result.report.step > 5)
+      EXPECT_LE((history.v[0] - mean).lpNorm<Eigen::Infinity>(), 2e-3 * mean.lpNorm<Eigen::Infinity>());
   }
 }
 

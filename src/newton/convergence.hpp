@@ -30,10 +30,7 @@ class Convergence {
       unresolved_ = 0;
       return {};
     }
-    if (step.is_of_shift) {
-      unresolved_ = 0;
-      return {};
-    }
+    if (step.is_of_shift) return {};
     if (has_small_step(step)) return Termination::step;
     if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
     if (has_ceased_to_improve(step)) return Termination::round_off;
@@ -102,7 +99,10 @@ class Convergence {
   /// The one rule for round-off: a step that promises less than the energy resolves may still lower the gradient, but not
   /// below the gradient's own round-off.
   bool has_ceased_to_improve(const Step& step) {
-    unresolved_ = at_.is_unresolved(step) ? unresolved_ + 1 : 0;
+    const std::optional<double> seen = task_.extras.position_round_off;
+    const bool is_hidden = seen && step.direction.cwiseAbs().maxCoeff() <= kFloor * *seen;
+    const bool is_below_energy = at_.is_unresolved(step);
+    unresolved_ = is_below_energy || is_hidden ? unresolved_ + 1 : 0;
     if (unresolved_ == 0) {
       still_ = 0;
       return false;
@@ -110,8 +110,8 @@ class Convergence {
     const double now = at_.gradient_norm();
     still_ = unresolved_ > 1 && now > kShrunk * last_shrunk_ ? still_ + 1 : 0;
     if (still_ == 0) last_shrunk_ = now;
-    const bool is_visible = is_first() && step.direction.cwiseAbs().maxCoeff() > kFloor * task_.extras.position_round_off;
-    return (!is_visible && now <= kFloor * at_.gradient_round_off()) || still_ >= kMostStill ||
+    const bool is_worth_a_try = !is_below_energy || (is_first() && seen && !is_hidden);
+    return (!is_worth_a_try && now <= kFloor * at_.gradient_round_off()) || still_ >= kMostStill ||
            unresolved_ >= kMostUnresolved;
   }
 
@@ -120,7 +120,7 @@ class Convergence {
   const DirichletContinuation& held_;
   double first_gradient_ = -1, first_step_ = -1;  ///< norms with the held dofs in place; below 0: not there yet
   double decrement_ = 0, gradient_of_decrement_ = 0;
-  int unresolved_ = 0;      ///< steps in a row that promised less than the energy resolves
+  int unresolved_ = 0;      ///< steps in a row that promised less than the energy resolves, or that positions hide
   double last_shrunk_ = 0;  ///< gradient norm of the last of these where it was less than before
   int still_ = 0;           ///< of these, those since
   int stalled_ = 0;

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <functional>
-#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -176,8 +176,9 @@ struct NewtonExtras {
   /// The solve has not converged there unless gradient and step are nothing beside these: whatever the tolerances, forces
   /// that just began to act are not passed over. Empty: it begins where the state is.
   VectorX step_to_start{}, gradient_of_step{};
-  /// Round-off of positions: a step of which a component is far above it is taken, whatever the gradient's round-off.
-  double position_round_off = std::numeric_limits<double>::infinity();
+  /// Where x are increments, the round-off of positions. A first step that is far above it is taken, whatever the
+  /// gradient's round-off; steps in a row that are not may end the solve, whatever they promise of the energy.
+  std::optional<double> position_round_off{};
 };
 
 /// Minimises `energy` over the unknowns of `dofs`, in place. Held dofs move from where they are to `target` (same length as
