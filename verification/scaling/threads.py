@@ -27,7 +27,7 @@ SCENES = [
     ("twisted bar, n_refs 1", "twisting-beam/twisting-beam-noremesh-nref1.json", ["/time/tend=0.3"]),
     ("twisted bar, n_refs 2", "twisting-beam/twisting-beam-noremesh-nref2.json", ["/time/tend=0.05"]),
     ("rollers", "rollers/monkey-soft-hard-noremesh-nref0.json", ["/time/tend=0.1"]),
-    ("rollers, n_refs 1", "rollers/monkey-soft-hard-noremesh-nref1.json", ["/time/tend=0.04"]),
+    ("rollers, n_refs 1", "rollers/monkey-soft-hard-noremesh-nref0.json", ["/geometry/0/n_refs=1", "/time/tend=0.04"]),
     ("masticator 3D, remeshed", "masticator/3D.json", ["/time/tend=1.3"]),
     ("ball-wall 3D, remeshed", "ball-wall/3D.json", ["/time/tend=0.0014"]),
     ("ball on spikes, remeshed", "spikes3d/drop-ball.json", ["/time/tend=0.36"]),
