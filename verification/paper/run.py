@@ -212,10 +212,14 @@ def run(case, options):
     # Writing a frame is not part of a step's work in the reference's figures.
     per_step = (total - sum(s["seconds"]["output"] for s in steps)) / len(steps)
     parts = sum(v for s in steps for k, v in s["seconds"].items() if k != "total")
+    touching = [s for s in steps if s["energy"]["contact"] != 0]
+    touching_seconds = sum(s["seconds"]["total"] - s["seconds"]["output"] for s in touching)
     row = {
         "case": name, "scene": scene, "set": " ".join(sets), "finished": status == 0, "certified": certified, "steps": len(steps),
         "seconds_per_step": per_step, "processor_seconds_per_step": processor / len(steps), "remesh_share": sum(s["seconds"]["remesh"] for s in steps) / total,
         "parts_over_total": parts / total,
+        "contact_steps": len(touching), "seconds_per_contact_step": touching_seconds / len(touching) if touching else None,
+        "newton_in_contact": sum(s["newton_iterations"] for s in touching),
         "newton": sum(s["newton_iterations"] for s in steps), "vertices_first": lines[0]["vertices"], "vertices": last["vertices"],
         "energy_total": last["energy"]["total"],
         # The projection's loss lowers the energy, too, but is no gain.
@@ -249,14 +253,15 @@ def table(rows):
     def cell(value, form):
         return "" if value is None else format(value, form)
 
-    lines = ["| scene | end | s/step | reference | ratio | vertices | energy, last step [J] | gained by remeshing, net [J] | reference, gross "
-             "| forgotten [J] | trials / accepted | µs a trial, median | remeshing | MB (reference) |", "|" + "---|" * 14]
+    lines = ["| scene | end | s/step | reference | ratio | in contact: steps, s/step, iterations | vertices | energy, last step [J] | gained by remeshing, net [J] | reference, gross "
+             "| forgotten [J] | trials / accepted | µs a trial, median | remeshing | MB (reference) |", "|" + "---|" * 15]
     for r in rows:
         ratio = r["reference_seconds"] / r["seconds_per_step"] if r["reference_seconds"] else None
         end = ("finished" if r["finished"] else "stopped") + (", certified" if r["certified"] else ", NOT CERTIFIED")
+        touching = f"{r['contact_steps']}, {r['seconds_per_contact_step']:.4f}, {r['newton_in_contact']}" if r["contact_steps"] else "none"
         lines.append(
             f"| {r['case']} | {r['steps']} steps, {end} | {r['seconds_per_step']:.4f} | {cell(r['reference_seconds'], '.4g')} "
-            f"| {cell(ratio, '.0f' if ratio and ratio >= 10 else '.2g')} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
+            f"| {cell(ratio, '.0f' if ratio and ratio >= 10 else '.2g')} | {touching} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
             f"| {cell(r['reference_gain'], '.4g')} | {cell(r.get('history_loss'), '.3g')} | {r['trials']} / {r['accepted']} "
             f"| {r['microseconds_per_trial'] if r['trials'] else 0:.0f} | {100 * r['remesh_share']:.0f} % "
             f"| {r['peak_rss_mb']:.0f} ({cell(r['reference_mb'], '.0f')}) |")
