@@ -25,7 +25,7 @@ namespace {
 
 using itr::Vec;
 
-constexpr double kMostFalsePositives[] = {0.02, 0.03};  ///< sharp, of a simulation; by the queries that do not collide
+constexpr double kMostFalsePositives[] = {0.02, 0.02};  ///< sharp, of a simulation; by the queries that do not collide
 constexpr double kSharp = 1e-10;                        ///< 1e-6 calls near passes hits; from 1e-14 on round-off misses some
 
 struct Query {

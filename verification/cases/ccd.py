@@ -5,10 +5,10 @@ from harness.suite import Result
 TITLE = "Collision queries"
 QUANTITY = "collisions missed; times of 0 for primitives that start apart; false positives by queries without a collision"
 REFERENCE = "exact answers of the data set of Wang et al. 2021"
-TOLERANCE = "no miss, no zero; false positives 2 % as sharp as it can be, 3 % as a simulation asks"
+TOLERANCE = "no miss, no zero; false positives 2 %, as sharp as it can be and as a simulation asks"
 NEEDS = ()
 
-MOST = {"sharp": 0.02, "product": 0.03}
+MOST = {"sharp": 0.02, "product": 0.02}
 
 
 def results(context):

@@ -118,8 +118,8 @@ class Change:
 
 
 PLANNED: list[Change] = [
-    Change("d-hat is a fifth of what it was where motions are prescribed without inertia", ("press-statics",),
-           ("frames", "states", "reports", "forces"), energy=0.05, counts=0.5, positions=None)]
+    Change("CCD sees more pairs that pass each other", ("cubes",), ("frames", "states", "reports"), energy=1e-6, counts=0.05,
+           positions=1e-6)]
 
 
 def planned(name):
