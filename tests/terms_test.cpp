@@ -50,6 +50,7 @@ TrialScene scene_of_all_terms() {
   TrialScene scene(1, 6, {.friction = true, .pressure = true, .damping = true});
   scene.context.contact.dhat = 0.1;  // to the obstacle and beyond
   scene.context.host.push_back(push({1, 0}));
+  scene.context.loads.cavities = {{{3}, 0.5, 1, 1.4, 0}};
   scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
   return scene;
 }
@@ -102,6 +103,7 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
       {TermKind::friction, [](auto& c) { c.contact.friction_coefficient = 0; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_iterations = 0; }},
       {TermKind::pressure, [](auto& c) { c.loads.pressures.clear(); }},
+      {TermKind::cavity, [](auto& c) { c.loads.cavities.clear(); }},
       {TermKind::damping, [](auto& c) { c.damping.clear(); }},
       {TermKind::contact_damping, [](auto& c) { c.damping.clear(); }},
       {TermKind::contact_damping, [](auto& c) { c.contact.enabled = false; }}};

@@ -81,6 +81,7 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   double barrier_second(double squared_distance) const;
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
+  const CollisionSurface& surface() const { return *surface_; }
 
  private:
   struct Active;

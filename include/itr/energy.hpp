@@ -125,6 +125,12 @@ struct StepLimit {
   std::vector<int> vertices;  ///< of the cell or of the pair, in the order of `kind`
 };
 
+/// A part factor v v^T of a Hessian that no stencil has: it is never assembled. The factor is not negative.
+struct RankOne {
+  VectorX vector;  ///< over all dofs
+  double factor = 0;
+};
+
 /// E: R^n -> R, +infinity outside the feasible set; x interleaved positions [m], n = Dim * num_vertices.
 class ITR_EXPORT Energy {
  public:
@@ -150,6 +156,8 @@ class ITR_EXPORT Energy {
   /// where the term cannot tell.
   virtual bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                              Workspace& workspace) const;
+  /// Adds the parts of the Hessian that add_hessian leaves out.
+  virtual void add_rank_ones(ConstVectorView x, std::vector<RankOne>& parts) const;
 };
 
 /// Makes a term for some cells: E(x) [J] times `scale` (alpha h^2 [s^2]) at the time t [s] of the end of a step, or null if

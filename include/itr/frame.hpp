@@ -197,6 +197,9 @@ struct ForceCurvePoint {
   std::array<std::vector<double>, 7> kinds;  ///< the last three are empty where a stored frame does not have them
   /// Estimated errors of the first four, by ErrorSource; empty: there are none.
   std::vector<std::array<std::vector<double>, 4>> errors{};
+  /// Volume [m^Dim] and overpressure [Pa] (2D: [N/m]) of the Cavity of this name; not a number: there is none of it. Empty:
+  /// the setup has no cavities.
+  std::vector<double> cavity{};
 };
 
 /// A PointTarget at the end of a step.

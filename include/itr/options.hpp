@@ -2,6 +2,7 @@
 // Materials, and the options of a simulation: plain values.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <functional>
 #include <map>
@@ -69,6 +70,21 @@ struct Material {
 
 // Contact.
 
+/// Surfaces whose friction a FrictionPair is about: of bodies, boundary facets with tags, and of obstacles.
+struct FrictionSide {
+  std::vector<int> bodies{};             ///< ids
+  std::vector<int> surfaces{};           ///< tags of boundary facets
+  std::vector<int> obstacle_vertices{};  ///< indices into Obstacles::rest
+};
+
+/// Coefficients of friction between two surfaces, in either order; both may be the same.
+struct FrictionPair {
+  FrictionSide a, b;
+  double statics = 0;  ///< mu_s: the most that friction resists before it slides, by the normal force
+  double kinetic = 0;  ///< mu_k of what slides, at most mu_s
+};
+inline constexpr int kMostFrictionPairs = 32;
+
 /// Contact and friction (IPC). docs/theory.md, "Contact", has the exact sums.
 struct ContactOptions {
   bool enabled = false;
@@ -76,10 +92,22 @@ struct ContactOptions {
   bool convergent = false;           ///< area weights, duplicate-region correction, 1/dhat^3: kappa is a pressure [Pa]
   double barrier_stiffness = 0;      ///< kappa; 0: as Setup::choose_defaults says
   bool adaptive_stiffness = false;   ///< from barrier_stiffness on as docs/theory.md, "Barrier stiffness", says
-  double friction_coefficient = 0;   ///< mu
+  double friction_coefficient = 0;   ///< mu of what is in no pair
   double friction_velocity = 1e-3;   ///< eps_v [m/s]: below it friction is smoothed; 0: chosen (Setup)
   int friction_iterations = 1;       ///< most lagging rounds a step; negative: no limit; 0: no friction
   double friction_tolerance = 1e-2;  ///< rounds end when the re-lagged gradient norm is below this * h
+  std::vector<FrictionPair> friction_pairs{};  ///< of several that a contact is in, the first counts
+
+  double largest_friction() const {
+    double largest = friction_coefficient;
+    for (const FrictionPair& pair : friction_pairs) largest = std::max(largest, pair.statics);
+    return largest;
+  }
+  bool has_friction() const { return enabled && friction_iterations != 0 && largest_friction() > 0; }
+  /// Whether friction falls where something begins to slide.
+  bool has_static_friction() const {
+    return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.kinetic < p.statics; });
+  }
 };
 
 // Damping.

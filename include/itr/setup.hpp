@@ -69,6 +69,18 @@ struct PressureCondition {
   std::function<double(const RestPoint<Dim>& X, double t)> pressure;
 };
 
+/// Gas or fluid in a closed cavity. Its overpressure p acts on the deformed facets with these tags and follows from the
+/// volume V that they enclose, V0 at rest. Of a gas p = (p0 + external) (V0 / V)^exponent - external, of a fluid
+/// p = p0 - bulk_modulus ln(V / V0).
+struct Cavity {
+  std::string name{};
+  std::vector<int> surfaces{};                 ///< tags of facets; together they have to close
+  std::function<double(double t)> pressure{};  ///< p0, the overpressure at V0 [Pa] (2D: [N/m])
+  double external_pressure = 101300;           ///< that acts from outside anyway [Pa]
+  double exponent = 1.4;                       ///< of a gas: 1 at constant temperature
+  double bulk_modulus = 0;                     ///< of a fluid [Pa]; 0: a gas
+};
+
 template <int Dim>
 struct InitialCondition {
   int body = 0;
@@ -124,6 +136,7 @@ struct ITR_EXPORT StepSetup {
   std::vector<DirichletCondition<Dim>> dirichlet;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
+  std::vector<Cavity> cavities;
   SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none
 
   TimeOptions time;

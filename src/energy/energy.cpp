@@ -60,6 +60,8 @@ bool Energy::get_vertex_steps(ConstVectorView, ConstVectorView, VectorView, Work
 
 bool Energy::find_blocking(ConstVectorView, ConstVectorView, double, BlockingPairs&, Workspace&) const { return false; }
 
+void Energy::add_rank_ones(ConstVectorView, std::vector<RankOne>&) const {}
+
 double EnergySum::value(ConstVectorView x, Workspace& workspace) const {
   double sum = 0;
   for (const auto& term : terms_) {

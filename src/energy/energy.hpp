@@ -34,6 +34,9 @@ class EnergySum final : public Energy {
   /// Asks the first term that can tell.
   bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
+  void add_rank_ones(ConstVectorView x, std::vector<RankOne>& parts) const override {
+    for (const auto& term : terms_) term->add_rank_ones(x, parts);
+  }
 
  private:
   std::vector<std::shared_ptr<const Energy>> terms_;

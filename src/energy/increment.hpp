@@ -43,6 +43,7 @@ class EnergyOfIncrement final : public Energy {
   bool get_vertex_steps(ConstVectorView d, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
   bool find_blocking(ConstVectorView d, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                      Workspace& workspace) const override;
+  void add_rank_ones(ConstVectorView d, std::vector<RankOne>& parts) const override { sum_.add_rank_ones(base_ + d, parts); }
 
  private:
   struct Term {

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "energy/cavity.hpp"
 #include "energy/mapped.hpp"
 
 namespace itr {
@@ -42,6 +43,9 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
   renew_term(inertia_, is_in(TermKind::inertia, terms), cells_, terms.materials, terms.mass, history.predictor);
   renew_term(elastic_, is_in(TermKind::elastic, terms), cells_, terms.materials, terms.scaling, terms.quadrature_degree);
   renew_term(loads_, is_in(TermKind::loads, terms), cells_, terms.materials, terms.loads, terms.scaling);
+  cavities_.clear();
+  for (const CavityLoad& cavity : terms.loads.cavities)
+    cavities_.push_back(std::make_shared<CavityEnergy<Dim>>(cells_, cavity, terms.scaling));
   map_.reset();
   contact_of_cells_.reset();
   if (contact_) spare_contact_ = std::move(contact_);

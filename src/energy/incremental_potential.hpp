@@ -66,6 +66,7 @@ class IncrementalPotential {
     visit(TermKind::contact, contact_of_cells_);
     visit(TermKind::friction, lagged.friction);
     visit(TermKind::pressure, lagged.pressure);
+    for (const auto& term : cavities_) visit(TermKind::cavity, term);
     for (const auto& term : lagged.damping) visit(TermKind::damping, term);
     for (const auto& term : lagged.contact_damping) visit(TermKind::contact_damping, term);
   }
@@ -98,6 +99,7 @@ class IncrementalPotential {
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
+  std::vector<std::shared_ptr<const Energy>> cavities_;
   std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed
   std::shared_ptr<const Energy> contact_of_cells_;
   std::vector<std::shared_ptr<const Energy>> host_;

@@ -21,12 +21,25 @@ constexpr double near_vertex() {
   return 0.5854101966249685;
 }
 
+/// A Cavity at one time.
+struct CavityLoad {
+  std::vector<int> surfaces;  ///< tags of facets
+  double pressure = 0;        ///< p0 [Pa]
+  double external_pressure = 0, exponent = 1, bulk_modulus = 0;
+
+  double pressure_at(double volume_ratio) const;  ///< p(V / V0) [Pa]
+  /// Minus the work of the overpressure from V0 on, by V0 [J/m^Dim].
+  double energy_at(double volume_ratio) const;
+  double stiffness_at(double volume_ratio) const;  ///< -V0 dp/dV [Pa]
+};
+
 /// Loads on a body at one time: functions of rest position, which several threads may call at once.
 template <int Dim>
 struct Loads {
   std::function<Vec<Dim>(const RestPoint<Dim>& X)> acceleration;  ///< body force by mass [m/s^2]; empty: none
   std::vector<std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>& X)>>> tractions;  ///< by facet tag [N/m^(Dim-1)]
   std::vector<std::pair<int, std::function<double(const RestPoint<Dim>& X)>>> pressures;    ///< the same, see PressureEnergy
+  std::vector<CavityLoad> cavities{};
   bool has_dead_loads() const { return acceleration || !tractions.empty(); }
 };
 

@@ -4,7 +4,7 @@
 // lagged, so that the forces are exact at the positions where the term was made.
 #pragma once
 
-#include "energy/energy.hpp"
+#include "energy/cone_sum.hpp"
 #include "energy/load.hpp"
 
 namespace itr {
@@ -20,32 +20,15 @@ class PressureEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
-  bool empty() const { return facets_.empty() && curves_.empty(); }
+  bool empty() const { return cones_.empty(); }
   /// Whether any force on an unknown was lagged: then the forces are exact only where this was made.
   bool is_lagged(const DofMap& dofs) const;
 
  private:
-  struct LoadedFacet {
-    std::array<int, Dim> vertices;
-    double pressure;  ///< [N/m^(Dim-1)], at the rest barycentre
-  };
-  struct CurvedLoadedFacet {
-    std::array<int, kQuadraticNodes<Dim - 1>> nodes;
-    CurvedEdges curved;
-    double pressure;
-  };
-  using Corners = Mat<Dim>;  ///< corners of a facet as columns, from the origin
-  Corners corners(const LoadedFacet& facet, ConstVectorView x) const;
-  /// f(facet, pressure times the point's share, weights of its nodes, corners of the cone) at points of all curved facets.
-  template <typename F>
-  void for_each_cone(ConstVectorView x, const F& f) const;
-
-  std::vector<LoadedFacet> facets_;
-  std::vector<CurvedLoadedFacet> curves_;
-  Vec<Dim> origin_ = Vec<Dim>::Zero();  ///< near the facets: less round-off
-  VectorX correction_;                  ///< sum of p c [N]
-  double rest_work_ = 0;                ///< sum of p (V(X) + c . X) [J]
-  double largest_force_ = 0;            ///< on a corner, without correction [N]
+  ConeSum<Dim> cones_;
+  VectorX correction_;        ///< sum of p c [N]
+  double rest_work_ = 0;      ///< sum of p (V(X) + c . X) [J]
+  double largest_force_ = 0;  ///< on a corner, without correction [N]
   double scale_;
 };
 

@@ -39,8 +39,20 @@ struct PotentialTerms {
 };
 
 /// In the order in which they are summed.
-enum class TermKind { inertia, elastic, loads, host, follower, contact, friction, pressure, damping, contact_damping };
-inline constexpr std::size_t kNumTermKinds = 10;
+enum class TermKind {
+  inertia,
+  elastic,
+  loads,
+  host,
+  follower,
+  contact,
+  friction,
+  pressure,
+  cavity,
+  damping,
+  contact_damping
+};
+inline constexpr std::size_t kNumTermKinds = 11;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -136,11 +148,7 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .is_between_bodies = true,
      .is_stored = true},
     {.kind = TermKind::friction,
-     .is_in =
-         [](const PotentialTerms<Dim>& terms) {
-           const ContactOptions& contact = terms.contact;
-           return contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
-         },
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.contact.has_friction(); },
      .energy = EnergyEntry::friction,
      .force = ForceEntry::friction,
      .in_predictions = InPredictions::left_out,
@@ -153,6 +161,10 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .energy = EnergyEntry::body,
      .force = ForceEntry::applied,
      .has_no_potential = true},
+    {.kind = TermKind::cavity,  // on the whole mesh; in patches it is a pressure
+     .is_in = [](const PotentialTerms<Dim>& terms) { return !terms.loads.cavities.empty(); },
+     .energy = EnergyEntry::body,
+     .force = ForceEntry::applied},
     {.kind = TermKind::damping,
      .is_in = [](const PotentialTerms<Dim>& terms) { return has_damping(terms, DampingOptions::Term::elastic); },
      .energy = EnergyEntry::damping,

@@ -29,6 +29,7 @@ std::string header(const ForceCurvePoint& curve) {
   std::string text = "step,t,name";
   for (std::size_t k = 0; k < curve.kinds.size(); ++k)
     for (std::size_t c = 0; c < curve.kinds[k].size(); ++c) text += fmt::format(",{}_{}", kKinds[k], names[c]);
+  if (!curve.cavity.empty()) text += ",volume,pressure";
   for (std::size_t s = 0; s < curve.errors.size(); ++s)
     for (std::size_t k = 0; k < curve.errors[s].size(); ++k)
       for (std::size_t c = 0; c < columns; ++c)
@@ -69,6 +70,7 @@ std::vector<std::string> lines_of(int step, double t, const std::vector<ForceCur
   for (const ForceCurvePoint& curve : curves) {
     std::string& line = lines.emplace_back(fmt::format("{},{},{}", step, t, curve.name));
     for (const auto& kind : curve.kinds) add_values(kind, line);
+    add_values(curve.cavity, line);
     for (const auto& source : curve.errors)
       for (const auto& kind : source) add_values(kind, line);
   }

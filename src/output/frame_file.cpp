@@ -21,6 +21,7 @@ using Integers = std::vector<std::int64_t>;
 
 /// Four rows a curve: contact, friction, reaction, all.
 const std::string kForceSums = "/totals/forces";
+const std::string kCavities = "/totals/cavities";  // volume and pressure by curve
 /// Names of length, mass and time; absent: SI units.
 const std::string kUnits = "/units";
 const std::string kDhat = "/mesh/dhat";
@@ -168,16 +169,18 @@ void write_asked(const Target& target, const AskedFields& asked) {
   write("/totals/kinetic_energy", asked.kinetic_energy, 0, "J");
   write("/totals/momentum", asked.momentum, 0, "kg m/s");
   if (asked.curves.empty()) return;
-  std::vector<double> sums;
+  std::vector<double> sums, cavities;
   std::string names;
   hdf5::File& file = target.file;
   for (const ForceCurvePoint& curve : in_units(asked.curves, target.units)) {
     names += (names.empty() ? "" : ",") + curve.name;
     for (const auto& kind : curve.kinds) sums.insert(sums.end(), kind.begin(), kind.end());
+    cavities.insert(cavities.end(), curve.cavity.begin(), curve.cavity.end());
   }
   const bool is_new = !file.has_written(kForceSums);
   file.write(kForceSums, sums, static_cast<int>(asked.curves.front().kinds.front().size()));
   if (is_new) file.write_attribute(kForceSums, "names", names);
+  if (!cavities.empty()) file.write(kCavities, cavities, 2);
 }
 
 Integers read_indices(const std::filesystem::path& path, const hdf5::File& file, const std::string& name, int columns,
@@ -370,6 +373,11 @@ StoredForces read_frame_forces(const std::filesystem::path& path) {
   auto next = sums.values.begin();
   for (ForceCurvePoint& curve : forces.curves)
     for (std::size_t k = 0; k < kinds; ++k, next += sums.columns) curve.kinds[k].assign(next, next + sums.columns);
+  if (!file.contains(kCavities)) return forces;
+  const std::vector<double> cavities = file.read_doubles(kCavities).values;
+  if (cavities.size() != 2 * forces.curves.size())
+    throw InputError({path.string(), kCavities, std::to_string(cavities.size()) + " numbers", "2 a name"});
+  for (std::size_t i = 0; i < forces.curves.size(); ++i) forces.curves[i].cavity = {cavities[2 * i], cavities[2 * i + 1]};
   return forces;
 }
 

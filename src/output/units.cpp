@@ -22,6 +22,10 @@ std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const
       for (std::size_t i = 0; i < kind.size(); ++i) kind[i] /= i < static_cast<std::size_t>(units.dim) ? force : moment;
     };
     for (auto& kind : curve.kinds) convert(kind);
+    if (!curve.cavity.empty()) {
+      curve.cavity[0] /= std::pow(units.factor("m"), units.dim);
+      curve.cavity[1] /= units.factor("Pa");
+    }
     for (auto& source : curve.errors)
       for (auto& kind : source) convert(kind);
   }

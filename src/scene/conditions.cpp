@@ -33,6 +33,7 @@ class ConditionReader {
     read_dirichlet();
     read_neumann();
     read_pressure();
+    read_cavities();
     read_motions(geometry);
     setup_.obstacles = std::move(geometry.obstacles);
     setup_.initial_displacement = read_initial("solution");
@@ -180,6 +181,53 @@ class ConditionReader {
         load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
       }
     }
+  }
+
+  void read_cavities() {
+    std::set<std::string> names;
+    for (const Node& node : boundary_["pressure_cavity"].items()) {
+      Cavity cavity{.surfaces = surfaces_of_cavity(node["id"]), .pressure = read_overpressure(node)};
+      cavity.name = node["name"].string("cavity " + text_of(read_label(node["id"].items().front(), 0)));
+      if (cavity.name.empty() || cavity.name.find_first_of(",\"\n") != std::string::npos)
+        node["name"].fail("a name without commas and quotes");
+      if (!names.insert(cavity.name).second) node["name"].fail("a name that no cavity before it has");
+      cavity.external_pressure = node["external_pressure"].non_negative(cavity.external_pressure);
+      const bool is_fluid = node["law"].choice({"gas", "fluid"}, 0) == 1;
+      if (node.has("bulk_modulus") != is_fluid)
+        node["bulk_modulus"].fail(is_fluid ? "the bulk modulus of the fluid" : "\"law\": \"fluid\" beside it");
+      if (is_fluid && node.has("exponent")) node["exponent"].fail("none: an exponent is of a gas");
+      cavity.bulk_modulus = is_fluid ? node["bulk_modulus"].positive(1) : 0;
+      cavity.exponent = node["exponent"].positive(cavity.exponent);
+      setup_.cavities.push_back(std::move(cavity));
+    }
+  }
+
+  std::vector<int> surfaces_of_cavity(const Node& ids) const {
+    if (ids.items().empty()) ids.fail("the surfaces of the cavity");
+    std::set<int> tags;
+    for (const Node& id : ids.items()) {
+      const std::size_t before = tags.size();
+      for (const int tag : ids_of(id))
+        if (facet_tags_.contains(tag)) tags.insert(tag);
+      if (tags.size() == before)
+        sets_.surfaces.refuse(id, read_condition_label(id), "the id of a surface of a body: ", why_unused(id));
+    }
+    return {tags.begin(), tags.end()};
+  }
+
+  std::function<double(double t)> read_overpressure(const Node& node) {
+    warn_of_interpolation(node["interpolation"]);
+    const Node value = node["value"];
+    if (!value.exists()) value.fail("the overpressure in the cavity at rest");
+    const ScalarFunction<Dim> pressure = read_scalar_function<Dim>(value, node["interpolation"]);
+    end_steps_at_kinks(value, node["interpolation"]);
+    const Vec<Dim> origin = Vec<Dim>::Zero(), elsewhere = Vec<Dim>::LinSpaced(0.7, 1.3);
+    check_defined<Dim>([&](const Vec<Dim>& X, double t) { return Vec<Dim>::Constant(pressure.function(X, t)).eval(); },
+                       {origin}, times(), value);
+    for (const double t : times())
+      if (pressure.function(origin, t) != pressure.function(elsewhere, t))
+        value.fail(abbreviate(value.json()) + ", which varies in space", "one pressure for the cavity, in time at most");
+    return [f = pressure.function, origin](double t) { return f(origin, t); };
   }
 
   /// Labels of obstacles, and names that the scene does not ask for.

@@ -20,7 +20,9 @@ bool has_time(const Node& root) { return root.has("time"); }
 bool is_dynamic(const Node& root) { return has_time(root) && !root["time"]["quasistatic"].boolean(false); }
 bool has_contact(const Node& root) { return root["contact"]["enabled"].boolean(false); }
 bool has_friction(const Node& root) {
-  return has_contact(root) && root["contact"]["friction_coefficient"].non_negative(0) > 0;
+  const Node contact = root["contact"];
+  return has_contact(root) &&
+         (contact["friction_coefficient"].non_negative(0) > 0 || !contact["friction_pairs"].items().empty());
 }
 bool has_open_stiffness(const Node& root) {
   return has_contact(root) && !root["solver"]["contact"].has("initial_barrier_stiffness");

@@ -150,6 +150,8 @@ void warn_of_idle_keys(const Node& root, const TimeOptions& time, bool has_obsta
     warn(contact["enabled"], "not true, so nothing collides: bodies pass through the obstacles");
   else if (!contact["enabled"].boolean(false) && contact["friction_coefficient"].number(0) > 0)
     warn(contact["friction_coefficient"], "without /contact/enabled = true there is no friction");
+  else if (!contact["enabled"].boolean(false) && contact.has("friction_pairs"))
+    warn(contact["friction_pairs"], "without /contact/enabled = true there is no friction");
   if (remesh.exists() && !remesh.has("enabled") && !remesh.json().empty())
     warn(remesh, "without \"enabled\": true the mesh stays as it is");
   if (const Node curve = remesh["curve"]; curve.has("acceptance_tolerance") && !curve["enabled"].boolean(false))

@@ -100,4 +100,11 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
 template <int Dim>
 std::vector<PointTarget> read_points(const Node& root);
 
+// `/contact/friction_pairs`.
+
+/// Throws InputError for what nothing has, and for a number or a name that both a body and a surface have.
+template <int Dim>
+std::vector<FrictionPair> read_friction_pairs(const Node& root, const PartNames& parts, const Sets& sets,
+                                              const Mesh<Dim>& mesh);
+
 }  // namespace itr::scene

@@ -107,11 +107,17 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   parts = name_parts<Dim>(geometries, obstacles, sets);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);
   read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
+  for (const Cavity& cavity : setup.cavities) {
+    if (std::ranges::any_of(curves, [&](const ForceTarget& curve) { return curve.name == cavity.name; }))
+      root["output"]["forces"].fail("\"" + cavity.name + "\", the name of a cavity", "another name");
+    curves.push_back({.name = cavity.name, .surfaces = cavity.surfaces});
+  }
   setup.fields.curves = std::move(curves);
   setup.fields.points = read_points<Dim>(root);
   setup.fields.error_bars = root["output"]["error_bars"].boolean(false);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
+  setup.contact.friction_pairs = read_friction_pairs<Dim>(root, parts, sets, setup.mesh);
   return setup;
 }
 

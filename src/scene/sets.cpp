@@ -42,6 +42,11 @@ References collect_references(const Node& root) {
     for (const Node& entry : root["initial_conditions"][list].items()) add_labels(entry["id"], references.bodies);
   for (const char* list : {"dirichlet_boundary", "neumann_boundary", "pressure_boundary", "obstacle_displacements"})
     for (const Node& entry : root["boundary_conditions"][list].items()) add_labels(entry["id"], references.surfaces);
+  for (const Node& entry : root["contact"]["friction_pairs"].items())
+    for (const char* side : {"a", "b"})
+      for (auto* labels : {&references.bodies, &references.surfaces}) add_labels(entry[side], *labels);
+  for (const Node& entry : root["boundary_conditions"]["pressure_cavity"].items())
+    add_labels(entry["id"], references.surfaces);
   for (const Node& entry : root["output"]["forces"].items()) {
     add_labels(entry["bodies"], references.bodies);
     add_labels(entry["surfaces"], references.surfaces);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "energy/contact/friction.hpp"
 #include "energy/contact/surface_builder.hpp"
 #include "fem/refined_chords.hpp"
 #include "simulation/closed_faces.hpp"
@@ -94,6 +95,24 @@ ClosedFaces closed_faces_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, 
   return faces;
 }
 
+/// Which sides of friction pairs the vertices of a surface without a proxy are of: points of refined chords are of those
+/// that all of their nodes are of.
+template <int Dim>
+std::vector<std::uint64_t> friction_sides_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh,
+                                             const ContactSurface<Dim>& contact) {
+  const auto& pairs = setup.contact.friction_pairs;
+  if (pairs.empty()) return {};
+  std::vector<std::uint64_t> of_nodes;
+  for (int node = 0; node < mesh.num_nodes(); ++node) of_nodes.push_back(friction_sides_of_node(mesh, node, pairs));
+  for (int v = 0; v < static_cast<int>(setup.obstacles.rest.size()); ++v)
+    of_nodes.push_back(friction_sides_of_obstacle(v, pairs));
+  if (!contact.map) return of_nodes;
+  std::vector<std::uint64_t> sides(contact.surface.area.size(), ~std::uint64_t{0});
+  for (std::size_t i = 0; i < sides.size(); ++i)
+    for (const int source : contact.map->sources(static_cast<int>(i))) sides[i] &= of_nodes[source];
+  return sides;
+}
+
 template <int Dim>
 ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, int age) {
   if (!setup.proxy) {
@@ -103,6 +122,7 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
     else
       contact.surface = collision_surface(mesh, setup.obstacles);
     contact.surface.closed = closed_faces_of(setup, mesh, age, contact);
+    contact.surface.friction_sides = friction_sides_of(setup, mesh, contact);
     return contact;
   }
   const CollisionProxy<Dim>& proxy = *setup.proxy;

@@ -54,7 +54,8 @@ double mean_vertex_area(const Mesh<Dim>& mesh) {
 /// Kinetic energy at the start, and what gravity gives over the size of the scene [J]; 0 where something else feeds it.
 template <int Dim>
 double available_energy(const Setup<Dim>& setup) {
-  if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.dirichlet.empty() || !setup.obstacles.motions.empty())
+  if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.cavities.empty() || !setup.dirichlet.empty() ||
+      !setup.obstacles.motions.empty())
     return 0;
   const Mesh<Dim>& mesh = setup.mesh;
   auto box = rest_box(mesh);
@@ -232,7 +233,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
   if (contact.enabled && contact.friction_velocity == 0 && this->time.has_inertia()) {
     std::string chosen = choose_friction_velocity(*this, contact);
-    if (contact.friction_coefficient > 0 && contact.friction_iterations != 0) words.push_back(std::move(chosen));
+    if (contact.has_friction()) words.push_back(std::move(chosen));
   }
   if (!remesh.enabled) return words;
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);

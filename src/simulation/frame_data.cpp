@@ -9,12 +9,14 @@
 #include <utility>
 
 #include "cell_stress.hpp"
+#include "energy/cavity.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/law_sum.hpp"
 #include "energy/inertia.hpp"
 #include "fem/locator.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
@@ -72,6 +74,19 @@ ForceCurvePoint curve_point(const Setup<Dim>& setup, const State<Dim>& state, co
   unknown.fill(std::vector<double>(point.kinds[0].size(), std::numeric_limits<double>::quiet_NaN()));
   point.errors.assign(kErrorSources, unknown);
   return point;
+}
+
+/// Gives a curve the volume and the pressure of the cavity of its name.
+template <int Dim>
+void add_cavity(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, ForceCurvePoint& curve) {
+  if (setup.cavities.empty()) return;
+  curve.cavity.assign(2, std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < setup.cavities.size(); ++i) {
+    if (setup.cavities[i].name != curve.name) continue;
+    const CavityEnergy<Dim> cavity(cells, loads_at(setup, state.t).cavities[i], 1);
+    const ConstVectorView x = state.history.x[0].head(Dim * cells.num_vertices);
+    curve.cavity = {cavity.volume(x), cavity.pressure(x)};
+  }
 }
 
 /// Displacements of targets, with their errors by source; NaN where these are asked for and unknown.
@@ -154,6 +169,7 @@ void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<D
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
   for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
+  for (ForceCurvePoint& curve : asked.curves) add_cavity(setup, cells, state, curve);
   asked.points = points_of(setup, state, errors);
   if (options.von_mises || options.stress) {
     CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup);

@@ -132,7 +132,7 @@ class HistoryTransfer {
 
 template <int Dim>
 bool depends_on_past(const StepSetup<Dim>& setup) {
-  const bool has_friction = setup.contact.enabled && setup.contact.friction_coefficient > 0;
+  const bool has_friction = setup.contact.enabled && setup.contact.largest_friction() > 0;
   return setup.time.has_inertia() || has_friction || !setup.damping.empty() || !setup.terms.empty();
 }
 

@@ -156,6 +156,7 @@ class LaggedSolve {
     }
     const bool is_open = end == RoundsEnd::most || end == RoundsEnd::cycle || end == RoundsEnd::stalled;
     if (summary.converged() && is_open) judge_lagging(x, std::move(now), to_string(end), round, summary);
+    if (summary.converged()) tell_of_jump(x, summary);
     return summary;
   }
 
@@ -204,6 +205,17 @@ class LaggedSolve {
         potential_.lag_friction(x, workspace_, lagged_);
       }
     }
+  }
+  /// Says where friction has fallen from static to kinetic within the step, which then depends on its length.
+  void tell_of_jump(const VectorX& x, NewtonSummary& summary) const {
+    const VectorX& v = problem_.start_velocity_;
+    if (v.size() == 0 || !lagged_.friction_of_surface) return;
+    const VectorX of_surface = surface_.motion(v);
+    const int pairs = lagged_.friction_of_surface->count_let_go(of_surface, potential_.on_surface(x));
+    if (pairs > 0)
+      summary.message += fmt::format(
+          "{}{} to slide, where friction falls from static to kinetic within the step: when is known to a step (/time/dt)",
+          summary.message.empty() ? "" : "; ", pairs == 1 ? "a contact begins" : fmt::format("{} contacts begin", pairs));
   }
   /// Norm of the gradient at x, with terms as they are lagged, scaled.
   double residual_of(const VectorX& x, const Lagged& lagged) {
@@ -288,10 +300,10 @@ class LaggedSolve {
     };
     constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
     const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
-    CorrectedSystem corrected(problem_.system(), [&](ConstVectorView iterate, const DofMap& dofs) {
+    CorrectedSystem corrected(problem_.newton_system(), [&](ConstVectorView iterate, const DofMap& dofs) {
       return least_motion_->rigid_motions(base_ + iterate, dofs);
     });
-    NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.system();
+    NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.newton_system();
     NewtonOptions options = setup_.newton;
     if (loose_force_ > 0) {
       options.force_tolerance = std::max(options.force_tolerance, loose_force_);
@@ -404,7 +416,7 @@ class LaggedSolve {
     double size = std::max(largest(before), largest(after));
     if (potential_.has_friction())
       size =
-          std::max(size, setup_.contact.friction_coefficient *
+          std::max(size, setup_.contact.largest_friction() *
                              largest(forces_of(x, now, [](const Traits& term) { return term.kind == TermKind::contact; })));
     return size > 0 ? largest(after - before) / size : 0;
   }

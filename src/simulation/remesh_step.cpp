@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/cavity.hpp"
 #include "energy/inertia.hpp"
 #include "geometry/bvh.hpp"
 #include "itr/energy.hpp"
@@ -148,6 +150,12 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
   static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, state.t);
+  // Patches see a cavity's pressure as it is: what they move hardly changes its volume.
+  const CellSet<Dim> cells = context.loads.cavities.empty() ? CellSet<Dim>() : whole_mesh(state.mesh, setup.obstacles.rest);
+  for (const CavityLoad& cavity : std::exchange(context.loads.cavities, {}))
+    for (const int tag : cavity.surfaces)
+      context.loads.pressures.emplace_back(
+          tag, [p = CavityEnergy<Dim>(cells, cavity, 1).pressure(x)](const RestPoint<Dim>&) { return p; });
   if (setup.follower.forces) {
     const int dofs = Dim * state.mesh.num_nodes();
     VectorX forces = VectorX::Zero(dofs);

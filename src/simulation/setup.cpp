@@ -3,9 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <set>
 
+#include "energy/cavity.hpp"
 #include "itr/core.hpp"
 #include "simulation/force_target.hpp"
 
@@ -48,6 +52,16 @@ void check_contact(const ContactOptions& contact) {
   require_not_negative("/contact/dhat", contact.dhat);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
   require_not_negative("/contact/friction_coefficient", contact.friction_coefficient);
+  const auto& pairs = contact.friction_pairs;
+  require(pairs.size() <= kMostFrictionPairs, "/contact/friction_pairs", static_cast<double>(pairs.size()),
+          fmt::format("at most {}", kMostFrictionPairs));
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::string place = fmt::format("/contact/friction_pairs/{}", i);
+    require_not_negative(place + "/static", pairs[i].statics);
+    require_not_negative(place + "/kinetic", pairs[i].kinetic);
+    require(pairs[i].kinetic <= pairs[i].statics, place + "/kinetic", pairs[i].kinetic,
+            fmt::format("at most the static coefficient, {}", pairs[i].statics));
+  }
   require_not_negative("/contact/epsv", contact.friction_velocity);
   require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
 }
@@ -144,6 +158,47 @@ void check_materials(const Setup<Dim>& setup) {
   }
 }
 
+/// A vertex where facets with these tags end: in 2D they do not go on there, in 3D an edge there has one of them; kNone:
+/// they close.
+template <int Dim>
+VertexId find_rim(const Mesh<Dim>& mesh, const std::vector<int>& tags) {
+  std::map<std::array<VertexId, Dim - 1>, int> sides;  // facets that go one way there less those that go the other
+  for (const FacetId f : mesh.live_facets()) {
+    if (std::ranges::find(tags, mesh.facet_tag(f)) == tags.end()) continue;
+    const auto& facet = mesh.facet(f);
+    for (int k = 0; k < Dim; ++k)
+      if constexpr (Dim == 2)
+        sides[{facet[k]}] += k == 0 ? 1 : -1;
+      else
+        sides[{std::min(facet[k], facet[(k + 1) % 3]), std::max(facet[k], facet[(k + 1) % 3])}] +=
+            facet[k] < facet[(k + 1) % 3] ? 1 : -1;
+  }
+  for (const auto& [at, count] : sides)
+    if (count != 0) return at[0];
+  return kNone;
+}
+
+template <int Dim>
+void check_cavities(const Setup<Dim>& setup) {
+  for (std::size_t i = 0; i < setup.cavities.size(); ++i) {
+    const Cavity& cavity = setup.cavities[i];
+    const std::string place = fmt::format("/boundary_conditions/pressure_cavity/{}", i);
+    require_positive(place + "/exponent", cavity.exponent);
+    require_not_negative(place + "/bulk_modulus", cavity.bulk_modulus);
+    require_not_negative(place + "/external_pressure", cavity.external_pressure);
+    if (const VertexId end = find_rim(setup.mesh, cavity.surfaces); end != kNone)
+      refuse(place + "/id",
+             fmt::format("a surface that does not close: it ends at ({:.6g}) m", fmt::join(setup.mesh.rest(end), ", ")),
+             "surfaces that close around the cavity");
+    const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
+    VectorX rest(Dim * cells.num_vertices);
+    for (int v = 0; v < cells.num_vertices; ++v) rest.template segment<Dim>(Dim * v) = cells.rest[v];
+    const double volume = CavityEnergy<Dim>(cells, CavityLoad{cavity.surfaces}, 1).volume(rest);
+    if (!(volume > 0))
+      refuse(place + "/id", volume < 0 ? "a surface around the body" : "no surface", "surfaces around a cavity in it");
+  }
+}
+
 template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
@@ -184,6 +239,7 @@ void Setup<Dim>::validate() const {
   StepSetup<Dim>::validate();
   check_materials(*this);
   check_proxy(*this);
+  check_cavities(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
   for (const auto& [name, list] :

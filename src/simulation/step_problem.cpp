@@ -15,6 +15,7 @@
 #include "geometry/quadratic_validity.hpp"
 #include "itr/core.hpp"
 #include "newton/curvature.hpp"
+#include "newton/rank_one_system.hpp"
 
 namespace itr {
 
@@ -90,6 +91,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
                                                            surface_.map.get());
   }
   if (!history.v.empty()) last_motion_ = relative_motion<Dim>(history.v[0]) * setup.time.dt;
+  if (!history.v.empty() && setup.contact.has_static_friction()) start_velocity_ = history.v[0];
   potential_.elastic()->set_quadrature_levels(levels);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
@@ -108,6 +110,14 @@ template <int Dim>
 SparseSystem& StepProblem<Dim>::system() {
   if (turn_ != cache_.served) reset_system();
   return cache_.system;
+}
+
+template <int Dim>
+NewtonSystem& StepProblem<Dim>::newton_system() {
+  SparseSystem& sparse = system();
+  if (terms_.loads.cavities.empty()) return sparse;
+  if (!rank_ones_) rank_ones_ = std::make_unique<RankOneSystem>(sparse);
+  return *rank_ones_;
 }
 
 /// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
@@ -163,17 +173,17 @@ VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
   EnergySum sum = potential_.sum(lagged_);
   if (least_motion_) sum.add(least_motion_);
   PrescribedMotion none;
-  const auto assemble = [&](PsdProjection psd) { system().assemble(sum, x, psd, dofs_, none, workspace_); };
+  const auto assemble = [&](PsdProjection psd) { newton_system().assemble(sum, x, psd, dofs_, none, workspace_); };
   const int unknowns = dofs_.num_unknowns;
   VectorX by_unknown;
   double curvature = 0;
   if (unknowns == 0) return {};
-  if (system().sees_all_directions()) {
+  if (newton_system().sees_all_directions()) {
     assemble(PsdProjection::none);
-    const bool is_indefinite = system().factorize(0).definiteness == linear::Definiteness::indefinite;
-    if (is_indefinite) curvature = find_negative_curvature(system(), unknowns, by_unknown);
+    const bool is_indefinite = newton_system().factorize(0).definiteness == linear::Definiteness::indefinite;
+    if (is_indefinite) curvature = find_negative_curvature(newton_system(), unknowns, by_unknown);
   } else {
-    curvature = find_negative_curvature_by_products(system(), assemble, unknowns, by_unknown).value_or(0);
+    curvature = find_negative_curvature_by_products(newton_system(), assemble, unknowns, by_unknown).value_or(0);
   }
   if (!(curvature < 0)) return {};
   return at_dofs(dofs_, by_unknown);

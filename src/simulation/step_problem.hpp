@@ -146,6 +146,8 @@ class StepProblem {
                    TimeErrors& errors);
   void reset_system();
   SparseSystem& system();
+  /// Adds what is never assembled to it.
+  NewtonSystem& newton_system();
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
 
@@ -168,9 +170,11 @@ class StepProblem {
   BarrierStiffness stiffness_;
   Lagged lagged_;  ///< of the last solve
   ProblemCache<Dim>& cache_;
-  unsigned long turn_ = 0;  ///< of the cache's system, when it was reset for this
-  int rounds_ = 0;          ///< of the last solve
-  double last_motion_ = 0;  ///< the largest relative motion in the step before [m]
+  std::unique_ptr<NewtonSystem> rank_ones_;  ///< over it, where there are cavities; null: not needed yet
+  unsigned long turn_ = 0;                   ///< of the cache's system, when it was reset for this
+  int rounds_ = 0;                           ///< of the last solve
+  double last_motion_ = 0;                   ///< the largest relative motion in the step before [m]
+  VectorX start_velocity_;                   ///< where static friction is above kinetic [m/s]; else empty
 };
 
 /// The least det F over the elements; of a curved one a lower bound.

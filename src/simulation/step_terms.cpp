@@ -42,6 +42,15 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
     loads.pressures.emplace_back(condition.tag, [f = condition.pressure, t](const RestPoint<Dim>& X) {
       return finite<Dim, double>(f(X, t), "pressure", X, t);
     });
+  for (const Cavity& cavity : setup.cavities) {
+    CavityLoad load{cavity.surfaces, 0, cavity.external_pressure, cavity.exponent, cavity.bulk_modulus};
+    load.pressure =
+        finite<Dim, double>(cavity.pressure ? cavity.pressure(t) : 0, "pressure of a cavity", Vec<Dim>::Zero(), t);
+    if (cavity.bulk_modulus == 0 && load.pressure + load.external_pressure < 0)
+      throw InputError({"", "pressure of a cavity", fmt::format("{:g} Pa at t = {:g} s, below a vacuum", load.pressure, t),
+                        fmt::format("at least minus the external pressure, {:g} Pa", load.external_pressure)});
+    loads.cavities.push_back(std::move(load));
+  }
   return loads;
 }
 

@@ -22,7 +22,7 @@ void StepProblem<Dim>::find_local_error(const History& history, const VectorX& i
     const double h = setup_.time.dt, chord = 4 * (1 + history.dt / h);
     const VectorX d = at_unknowns(dofs_, (increment - h * history.v[0]) / chord);
     VectorX force(dofs_.num_unknowns);
-    system().product()(d, force);
+    newton_system().product()(d, force);
     errors.local = 0.5 * std::max(0.0, d.dot(force)) / terms_.scaling;
     return;
   }
@@ -35,7 +35,7 @@ void StepProblem<Dim>::find_local_error(const History& history, const VectorX& i
       if (contact[i] != 0 && dofs_.unknown[i] != kNone) force[dofs_.unknown[i]] = 0;
     linear::Asked asked{.residual = kDigits};
     asked.if_indefinite = true;
-    const bool is_solved = system().solve(0, force, asked, f).outcome == linear::Outcome::ok && f.allFinite();
+    const bool is_solved = newton_system().solve(0, force, asked, f).outcome == linear::Outcome::ok && f.allFinite();
     return is_solved ? std::pair(force, f) : std::pair(force, values);
   };
   const auto [force, f] = filtered(error.x);
@@ -93,7 +93,7 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
   if (dofs_.num_unknowns == 0 || !(terms_.has_inertia || has_extrapolation)) return errors;
   if (!has_system) {
     PrescribedMotion none;
-    system().assemble(potential_.sum(lagged_), x, PsdProjection::clamp, dofs_, none, workspace_);
+    newton_system().assemble(potential_.sum(lagged_), x, PsdProjection::clamp, dofs_, none, workspace_);
   }
   if (!terms_.has_inertia || !potential_.contact()) {
     find_local_error(history, increment, {}, errors);

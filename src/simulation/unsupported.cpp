@@ -26,6 +26,10 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
+    {{"/contact/friction_pairs", "friction by pair where a collision mesh touches"},
+     [](const Setup<Dim>& setup, bool) { return !setup.contact.friction_pairs.empty() && setup.proxy; }},
+    {{"/output/error_bars", "error bars where the pressure of a cavity follows its volume"},
+     [](const Setup<Dim>& setup, bool) { return !setup.cavities.empty() && setup.fields.error_bars; }},
     {{"/solver/advanced/lump_mass_matrix",
       "lumped mass with remeshing of quadratic elements (discr_order 2 or curve/enabled)"},
      [](const Setup<Dim>& setup, bool curves) { return setup.remesh.enabled && curves && setup.lump_mass; }},

@@ -169,7 +169,7 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
 template <int Dim>
 void find_odd_friction(const Setup<Dim>& setup, std::vector<std::string>& found) {
   constexpr double kUsual = 2;
-  const double friction = setup.contact.friction_coefficient;
+  const double friction = setup.contact.largest_friction();
   if (setup.contact.enabled && friction > kUsual)
     found.push_back(fmt::format("friction coefficient {:.4g} is unusual: 0.3 is 30 %", friction));
 }
@@ -233,6 +233,7 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
   std::set<int> tags;
   for (const auto& load : setup.neumann) tags.insert(load.tag);
   for (const auto& load : setup.pressure) tags.insert(load.tag);
+  for (const Cavity& cavity : setup.cavities) tags.insert(cavity.surfaces.begin(), cavity.surfaces.end());
   if (tags.empty() || setup.dirichlet.empty()) return;
   std::set<int> free_tags;
   const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
@@ -253,7 +254,7 @@ void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found)
   if (parts == 0) return;
   std::string names;
   for (const int body : bodies) names += (names.empty() ? "" : ", ") + set_text(setup.names.bodies, body);
-  const bool has_friction = setup.contact.friction_coefficient > 0 && setup.contact.friction_iterations != 0;
+  const bool has_friction = setup.contact.has_friction();
   found.push_back(fmt::format("{} of the bodies' parts have neither inertia nor a held vertex (id {}): {}", parts, names,
                               !setup.contact.enabled ? "nothing keeps them in place"
                               : has_friction         ? "only contact and friction can keep them in place"

@@ -34,8 +34,14 @@ void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
 }
 
-bool has_friction(const ContactOptions& contact) {
-  return contact.enabled && contact.friction_coefficient > 0 && contact.friction_iterations != 0;
+std::string coefficients_text(const ContactOptions& contact) {
+  std::string text = fmt::format("mu = {}", contact.friction_coefficient);
+  for (std::size_t i = 0; i < contact.friction_pairs.size(); ++i) {
+    const FrictionPair& pair = contact.friction_pairs[i];
+    text += fmt::format(", pair {}: {}", i, pair.statics);
+    if (pair.kinetic != pair.statics) text += fmt::format(" to {}", pair.kinetic);
+  }
+  return text;
 }
 
 std::string describe(const TimeOptions& time, const Units& units) {
@@ -149,14 +155,20 @@ class Explanation {
          is_damped                ? "/solver/rayleigh_damping"
          : setup_.damping.empty() ? "no /solver/rayleigh_damping"
                                   : "no /time: static");
+    std::string cavities;
+    for (const Cavity& cavity : setup_.cavities)
+      cavities += fmt::format("{}{}: {}", cavities.empty() ? "" : ", ", cavity.name,
+                              cavity.bulk_modulus > 0 ? "fluid" : fmt::format("gas, exponent {}", cavity.exponent));
+    term("cavities", !setup_.cavities.empty(),
+         setup_.cavities.empty() ? "no /boundary_conditions/pressure_cavity" : cavities);
     term("contact", setup_.contact.enabled,
          !setup_.contact.enabled     ? "/contact/enabled is false"
          : setup_.contact.convergent ? "convergent form"
                                      : "/contact/enabled");
-    term("friction", has_friction(setup_.contact),
-         has_friction(setup_.contact) ? fmt::format("mu = {}", setup_.contact.friction_coefficient)
-         : !setup_.contact.enabled    ? "no contact"
-                                      : "no coefficient of friction, or no iterations for it");
+    term("friction", setup_.contact.has_friction(),
+         setup_.contact.has_friction() ? coefficients_text(setup_.contact)
+         : !setup_.contact.enabled     ? "no contact"
+                                       : "no coefficient of friction, or no iterations for it");
     term("remeshing", setup_.remesh.enabled,
          setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
   }
@@ -312,7 +324,7 @@ Json facts(const Setup<Dim>& setup, const Json& scene) {
           {"bodies", bodies},
           {"box", filled_box(setup.mesh, units)},
           {"contact", contact.enabled},
-          {"friction", has_friction(contact)},
+          {"friction", contact.has_friction()},
           {"settings", chosen_settings(setup, scene)},
           {"solvers", available_solvers()}};
 }

@@ -44,6 +44,10 @@ std::vector<Prescribed> all_prescribed(const Setup<Dim>& setup, const Vec<Dim>& 
     all.push_back({fmt::format("the pressure on the surface {}", c.tag), [&c, X = place_with(setup, c.tag)](double t) {
                      return VectorX(VectorX::Constant(1, c.pressure(X, t)));
                    }});
+  for (const Cavity& cavity : setup.cavities)
+    if (cavity.pressure)
+      all.push_back({"the pressure of " + cavity.name,
+                     [&cavity](double t) { return VectorX(VectorX::Constant(1, cavity.pressure(t))); }});
   if (setup.body_acceleration)
     all.push_back({"the acceleration of the bodies",
                    [&setup, center](double t) -> VectorX { return setup.body_acceleration(center, t); }});

@@ -52,6 +52,9 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
       if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, condition.traction(X, t).norm());
     for (const auto& condition : setup.pressure)
       if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, std::abs(condition.pressure(X, t)));
+    for (const Cavity& cavity : setup.cavities)
+      if (cavity.pressure && std::ranges::find(cavity.surfaces, mesh.facet_tag(f)) != cavity.surfaces.end())
+        raise(actions.traction, std::abs(cavity.pressure(t)));
   }
   for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
     if (const int motion = setup.obstacles.motion[o]; motion != kNone) {

@@ -8,27 +8,85 @@
 #include <algorithm>
 #include <cmath>
 
+#include "energy/contact/pairs.hpp"
+
 namespace itr {
 
 namespace {
 
-double f0(double y, double eps) { return y < eps ? y * y * (1 - y / (3 * eps)) / eps + eps / 3 : y; }
-double f1_over_y(double y, double eps) { return y < eps ? (2 - y / eps) / eps : 1 / y; }
-double f2(double y, double eps) { return y < eps ? 2 * (1 - y / eps) / eps : 0; }
+constexpr double kFall = 2;  ///< by eps_v: over which speeds above eps_v static friction falls to kinetic
+
+/// The place of a slip speed y on the fall from static to kinetic friction: 0 before it, 1 behind it.
+double on_fall(double y, double eps) { return std::min(1.0, (y - eps) / (kFall * eps)); }
+
+/// Friction by slip speed, of a pair whose kinetic friction is `kinetic` times the static: its potential, it by y, and its
+/// derivative. It is f1 below eps and goes from 1 to `kinetic` by a cubic function above.
+double f0(double y, double eps, double kinetic) {
+  if (y < eps) return y * y * (1 - y / (3 * eps)) / eps + eps / 3;
+  if (kinetic == 1) return y;
+  const double t = on_fall(y, eps), width = kFall * eps;
+  return y - (1 - kinetic) * (width * t * t * t * (1 - t / 2) + std::max(0.0, y - eps - width));
+}
+double f1_over_y(double y, double eps, double kinetic) {
+  if (y < eps) return (2 - y / eps) / eps;
+  if (kinetic == 1) return 1 / y;
+  const double t = on_fall(y, eps);
+  return (1 - (1 - kinetic) * t * t * (3 - 2 * t)) / y;
+}
+double f2(double y, double eps, double kinetic) {
+  if (y < eps) return 2 * (1 - y / eps) / eps;
+  if (kinetic == 1) return 0;
+  const double t = on_fall(y, eps);
+  return -(1 - kinetic) * 6 * t * (1 - t) / (kFall * eps);
+}
 
 /// Derivative by the slip velocity v of w(v), where y / f1(y) w = v for y = |v|, linearised at any w (Chan, Golub & Mulet
-/// 1999); of f1(y) v / y where w is that. Symmetrised; its eigenvalues are >= 0 for |w| <= 1.
+/// 1999); of f1(y) v / y where w is that. Symmetrised; its eigenvalues are >= 0 for |w| <= 1: what the fall from static to
+/// kinetic friction would make of them is left out.
 template <int N>
-Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, double eps) {
-  const double y = v.norm(), isotropic = f1_over_y(y, eps);
+Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, double eps, double kinetic) {
+  const double y = v.norm(), isotropic = f1_over_y(y, eps, kinetic);
   Mat<N> inner = Mat<N>::Identity();
   if (y > 0) {
-    const double slope = y < eps ? 1 / (eps * eps * isotropic * isotropic) : 1;  // of y / f1(y)
+    double slope = 1;  // of y / f1(y)
+    if (y < eps)
+      slope = 1 / (eps * eps * isotropic * isotropic);
+    else if (kinetic < 1)
+      slope =
+          std::min((isotropic - f2(y, eps, kinetic)) / (isotropic * isotropic * y), 1 / std::max(w.norm(), isotropic * y));
     const Mat<N> turn = slope / (2 * y) * w * v.transpose();
     inner -= turn + turn.transpose();
   }
   return isotropic * inner;
 }
+
+/// Coefficients of friction of an active pair.
+struct Coefficients {
+  double statics, kinetic;
+};
+Coefficients coefficients_of(const ContactStencil& pair, const ContactOptions& options, const CollisionSurface& surface) {
+  if (!surface.friction_sides.empty()) {
+    const int first = size_of_first(pair.kind);
+    std::array<std::uint64_t, 2> sides{~std::uint64_t{0}, ~std::uint64_t{0}};
+    for (int k = 0; k < pair.size(); ++k) sides[k < first ? 0 : 1] &= surface.friction_sides[pair.vertices[k]];
+    for (std::size_t i = 0; i < options.friction_pairs.size(); ++i) {
+      const auto is_of = [&](int end, int side) { return sides[end] >> (2 * i + side) & 1; };
+      if ((is_of(0, 0) && is_of(1, 1)) || (is_of(0, 1) && is_of(1, 0)))
+        return {options.friction_pairs[i].statics, options.friction_pairs[i].kinetic};
+    }
+  }
+  return {options.friction_coefficient, options.friction_coefficient};
+}
+
+template <typename IsOf>
+std::uint64_t sides_of(const std::vector<FrictionPair>& pairs, const IsOf& is_of) {
+  std::uint64_t sides = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    sides |= std::uint64_t{is_of(pairs[i].a)} << 2 * i | std::uint64_t{is_of(pairs[i].b)} << (2 * i + 1);
+  return sides;
+}
+
+bool has(const std::vector<int>& ids, int id) { return std::find(ids.begin(), ids.end(), id) != ids.end(); }
 
 Eigen::Matrix<double, 2, 1> tangent_basis(const Vec<2>& normal) { return {-normal[1], normal[0]}; }
 Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
@@ -39,6 +97,32 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
 }
 
 }  // namespace
+
+template <int Dim>
+std::uint64_t friction_sides_of_node(const Mesh<Dim>& mesh, VertexId node, const std::vector<FrictionPair>& pairs) {
+  std::uint64_t sides = 0;
+  const auto add = [&](FacetId f) {
+    const auto& facet = mesh.facet(f);
+    const auto holds = [&](CellId c, VertexId v) { return std::ranges::find(mesh.cell(c), v) != mesh.cell(c).end(); };
+    for (const CellId c : mesh.cells_of(facet[0])) {
+      if (!std::ranges::all_of(facet, [&](VertexId v) { return holds(c, v); })) continue;
+      sides |= sides_of(pairs, [&](const FrictionSide& side) {
+        return has(side.bodies, mesh.body(c)) || has(side.surfaces, mesh.facet_tag(f));
+      });
+    }
+  };
+  if (const EdgeKey edge = mesh.edge_of_node(node); edge[0] != kNone)
+    std::ranges::for_each(mesh.facets_of_edge(edge), add);
+  else
+    std::ranges::for_each(mesh.facets_of(node), add);
+  return sides;
+}
+template std::uint64_t friction_sides_of_node(const Mesh<2>&, VertexId, const std::vector<FrictionPair>&);
+template std::uint64_t friction_sides_of_node(const Mesh<3>&, VertexId, const std::vector<FrictionPair>&);
+
+std::uint64_t friction_sides_of_obstacle(int vertex, const std::vector<FrictionPair>& pairs) {
+  return sides_of(pairs, [&](const FrictionSide& side) { return has(side.obstacle_vertices, vertex); });
+}
 
 template <int Dim>
 FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVectorView x, Workspace& workspace,
@@ -58,15 +142,17 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
   pairs_.clear();
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
+    const auto [statics, kinetic] = coefficients_of(s, options, contact.surface());
+    if (statics == 0) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
     const double distance = std::sqrt(q.squared);
     Pair pair{.vertices = s.vertices,
               .size = s.size(),
               .coefficients = q.coefficients,
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
-              .force = 0};
-    pair.force =
-        options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
+              .force = 0,
+              .kinetic = kinetic / statics};
+    pair.force = statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
   }
 }
@@ -83,12 +169,22 @@ auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) con
 }
 
 template <int Dim>
+int FrictionEnergy<Dim>::count_let_go(ConstVectorView v, ConstVectorView x) const {
+  return static_cast<int>(std::count_if(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
+    if (pair.kinetic == 1 || slip_velocity(pair, x).norm() < (1 + kFall) * epsv_) return false;
+    Vec<Dim> relative = Vec<Dim>::Zero();
+    for (int k = 0; k < pair.size; ++k) relative += pair.coefficients[k] * v.segment<Dim>(Dim * pair.vertices[k]);
+    return (pair.tangents.transpose() * relative).norm() < epsv_;
+  }));
+}
+
+template <int Dim>
 void FrictionEnergy<Dim>::begin_solve(ConstVectorView x, bool is_near) {
   is_primal_dual_ = true;
   for (Pair& pair : pairs_) {
     pair.slip = slip_velocity(pair, x);
     pair.ratio.setZero();
-    if (is_near) pair.ratio = f1_over_y(pair.slip.norm(), epsv_) * pair.slip;
+    if (is_near) pair.ratio = f1_over_y(pair.slip.norm(), epsv_, pair.kinetic) * pair.slip;
   }
 }
 
@@ -96,8 +192,8 @@ template <int Dim>
 void FrictionEnergy<Dim>::follow(ConstVectorView x, double fraction) {
   for (Pair& pair : pairs_) {
     const Vec<kTangents> slip = slip_velocity(pair, x);
-    const Mat<kTangents> derivative = linearised_ratio<kTangents>(pair.slip, pair.ratio, epsv_);
-    const Vec<kTangents> at_slip = f1_over_y(pair.slip.norm(), epsv_) * pair.slip;
+    const Mat<kTangents> derivative = linearised_ratio<kTangents>(pair.slip, pair.ratio, epsv_, pair.kinetic);
+    const Vec<kTangents> at_slip = f1_over_y(pair.slip.norm(), epsv_, pair.kinetic) * pair.slip;
     pair.ratio += fraction * (at_slip - pair.ratio) + derivative * (slip - pair.slip);
     pair.ratio /= std::max(1.0, pair.ratio.norm());
     pair.slip = slip;
@@ -134,7 +230,7 @@ void FrictionEnergy<Dim>::relax(const FrictionEnergy& before, double factor) {
 template <int Dim>
 double FrictionEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
-  for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_);
+  for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_, pair.kinetic);
   return scale_ / rate_ * sum;
 }
 
@@ -142,7 +238,7 @@ template <int Dim>
 void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const Vec<Dim> force = scale_ * pair.force * f1_over_y(v.norm(), epsv_) * (pair.tangents * v);
+    const Vec<Dim> force = scale_ * pair.force * f1_over_y(v.norm(), epsv_, pair.kinetic) * (pair.tangents * v);
     for (int k = 0; k < pair.size; ++k) gradient.segment<Dim>(Dim * pair.vertices[k]) += pair.coefficients[k] * force;
   }
 }
@@ -152,13 +248,13 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4 * Dim, 4 * Dim> block;
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const double y = v.norm(), isotropic = f1_over_y(y, epsv_);
-    // Along v the second derivative is f2, across it f1 / y; both are >= 0, so only the sign of the force can spoil it.
+    const double y = v.norm(), isotropic = f1_over_y(y, epsv_, pair.kinetic);
+    // Along v the second derivative is f2, across it f1 / y >= 0.
     Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
     if (is_primal_dual_)
-      inner = linearised_ratio<kTangents>(v, pair.ratio, epsv_);
+      inner = linearised_ratio<kTangents>(v, pair.ratio, epsv_, pair.kinetic);
     else if (y > 0)
-      inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
+      inner += (projected(f2(y, epsv_, pair.kinetic), psd) - isotropic) / (y * y) * v * v.transpose();
     const double force = projected(pair.force, psd);
     if (force == 0) continue;
     const Mat<Dim> world = scale_ * rate_ * force * pair.tangents * inner * pair.tangents.transpose();

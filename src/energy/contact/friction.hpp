@@ -7,6 +7,12 @@
 
 namespace itr {
 
+/// Which sides of friction pairs a node of the mesh is of, by the boundary facets there, or a vertex of obstacles: bit 2 i
+/// for side a of pair i, bit 2 i + 1 for its side b.
+template <int Dim>
+std::uint64_t friction_sides_of_node(const Mesh<Dim>& mesh, VertexId node, const std::vector<FrictionPair>& pairs);
+std::uint64_t friction_sides_of_obstacle(int vertex, const std::vector<FrictionPair>& pairs);
+
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
 /// (docs/theory.md, "Friction").
 template <int Dim>
@@ -24,6 +30,8 @@ class FrictionEnergy final : public Energy {
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
   bool empty() const { return pairs_.empty(); }
+  /// Number of pairs that stuck while vertices moved with `v` [m/s], and slide at x, with less friction.
+  int count_let_go(ConstVectorView v, ConstVectorView x) const;
 
   /// Begins a solve at x by the primal-dual Newton method (docs/theory.md, "Friction"): Hessians from here on are those of
   /// the law of friction linearised in slip and force, so that few iterations find what sticks, however small eps_v is.
@@ -41,7 +49,8 @@ class FrictionEnergy final : public Energy {
     int size;
     Vec<4> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
     Eigen::Matrix<double, Dim, kTangents> tangents;
-    double force;  ///< mu * normal force * weight [N]
+    double force;        ///< mu_s * normal force * weight [N]
+    double kinetic = 1;  ///< mu_k by mu_s
     /// Slip velocity at the iterate [m/s], and friction by the most that it can be: as linearised, the second unknown.
     Vec<kTangents> slip = Vec<kTangents>::Zero(), ratio = Vec<kTangents>::Zero();
   };

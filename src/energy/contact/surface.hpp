@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,8 @@ struct CollisionSurface {
   /// the patch cannot change.
   std::vector<char> counts;
   ClosedFaces closed;  ///< pairs that are no contact yet
+  /// By problem vertex, which sides of ContactOptions::friction_pairs it is of: bits as FrictionSides has them. Empty: none.
+  std::vector<std::uint64_t> friction_sides;
 
   // 3D only.
   std::vector<std::array<int, 3>> triangle_edges;  ///< of corners (0 1), (1 2), (2 0)

@@ -129,6 +129,7 @@ class LocalProblem {
   VertexId node_of(VertexId a, VertexId b) const;
   bool is_on_surface(const LocalVertex& v) const;
   bool is_closed(const LocalVertex& v) const;
+  std::uint64_t friction_sides_of(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();

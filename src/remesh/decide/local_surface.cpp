@@ -2,6 +2,7 @@
 // The surface of a local problem: what can touch what the patch changes.
 #include <algorithm>
 
+#include "energy/contact/friction.hpp"
 #include "local_problem.hpp"
 #include "remesh/curved_cell.hpp"
 
@@ -98,6 +99,18 @@ bool LocalProblem<Dim>::is_closed(const LocalVertex& v) const {
   return node ? has_closed(*node) : mesh_.steps_apart(v.id) == 0;
 }
 
+/// Which sides of friction pairs a vertex is of: one that the edit creates on an edge of those that both ends are of.
+template <int Dim>
+std::uint64_t LocalProblem<Dim>::friction_sides_of(const LocalVertex& v) const {
+  const auto& pairs = state_.context.contact.friction_pairs;
+  if (v.kind == Kind::of_obstacle) return friction_sides_of_obstacle(v.id, pairs);
+  if (!is_created(v.id)) return friction_sides_of_node(mesh_, v.id, pairs);
+  const auto* node = edit_.created_node(v.id);
+  const auto [a, b] = node ? node->edge : edit_.edge;
+  const auto of = [&](VertexId end) { return friction_sides_of({is_created(end) ? Kind::created : Kind::of_mesh, end}); };
+  return of(a) & of(b);
+}
+
 /// The part of the surface that can touch what changes, with the stars of its vertices: contact is weighted by them.
 template <int Dim>
 void LocalProblem<Dim>::add_surface() {
@@ -153,15 +166,19 @@ void LocalProblem<Dim>::add_surface() {
   surface.counts = changes_;
   surface.closed =
       closed_faces<Dim>(cells_.rest, state_.context.contact.dhat, 0, [&](int i) { return is_closed(vertices_[i]); });
+  surface.friction_sides.clear();
+  if (!state_.context.contact.friction_pairs.empty())
+    for (const LocalVertex& v : vertices_) surface.friction_sides.push_back(friction_sides_of(v));
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
-#define ITR_INSTANTIATE(Dim)                                 \
-  template void LocalProblem<Dim>::find_what_changes();      \
-  template void LocalProblem<Dim>::find_contacts();          \
-  template void LocalProblem<Dim>::find_stars_of_touching(); \
-  template void LocalProblem<Dim>::add_surface();            \
-  template bool LocalProblem<Dim>::is_closed(const LocalVertex&) const;
+#define ITR_INSTANTIATE(Dim)                                            \
+  template void LocalProblem<Dim>::find_what_changes();                 \
+  template void LocalProblem<Dim>::find_contacts();                     \
+  template void LocalProblem<Dim>::find_stars_of_touching();            \
+  template void LocalProblem<Dim>::add_surface();                       \
+  template bool LocalProblem<Dim>::is_closed(const LocalVertex&) const; \
+  template std::uint64_t LocalProblem<Dim>::friction_sides_of(const LocalVertex&) const;
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr
