@@ -39,8 +39,21 @@ struct PotentialTerms {
 };
 
 /// In the order in which they are summed.
-enum class TermKind { inertia, elastic, loads, host, follower, contact, friction, pressure, damping, contact_damping };
-inline constexpr std::size_t kNumTermKinds = 10;
+enum class TermKind {
+  inertia,
+  elastic,
+  loads,
+  host,
+  follower,
+  contact,
+  adhesion,
+  friction,
+  adhesive_friction,
+  pressure,
+  damping,
+  contact_damping
+};
+inline constexpr std::size_t kNumTermKinds = 12;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -135,6 +148,13 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },  // the surface is its own
      .is_between_bodies = true,
      .is_stored = true},
+    {.kind = TermKind::adhesion,
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.contact.has_adhesion(); },
+     .energy = EnergyEntry::contact,
+     .force = ForceEntry::contact,
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .is_between_bodies = true,
+     .is_stored = true},
     {.kind = TermKind::friction,
      .is_in =
          [](const PotentialTerms<Dim>& terms) {
@@ -145,6 +165,17 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .force = ForceEntry::friction,
      .in_predictions = InPredictions::left_out,
      .is_bounded = [](const PotentialTerms<Dim>&) { return true; },
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .needs_velocities = true,
+     .is_between_bodies = true},
+    {.kind = TermKind::adhesive_friction,
+     .is_in =
+         [](const PotentialTerms<Dim>& terms) {
+           const AdhesionOptions& adhesion = terms.contact.adhesion;
+           return terms.contact.has_adhesion() && adhesion.tangential_coefficient > 0 && adhesion.iterations != 0;
+         },
+     .energy = EnergyEntry::friction,
+     .force = ForceEntry::friction,
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .needs_velocities = true,
      .is_between_bodies = true},

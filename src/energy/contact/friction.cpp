@@ -16,6 +16,11 @@ double f0(double y, double eps) { return y < eps ? y * y * (1 - y / (3 * eps)) /
 double f1_over_y(double y, double eps) { return y < eps ? (2 - y / eps) / eps : 1 / y; }
 double f2(double y, double eps) { return y < eps ? 2 * (1 - y / eps) / eps : 0; }
 
+// Adhesion has these, which let go: the polynomials go on to 2 eps, where f1 is 0 again.
+double fading_f0(double y, double eps) { return y < 2 * eps ? y * y * (1 - y / (3 * eps)) / eps : 4 * eps / 3; }
+double fading_f1_over_y(double y, double eps) { return y < 2 * eps ? (2 - y / eps) / eps : 0; }
+double fading_f2(double y, double eps) { return y < 2 * eps ? 2 * (1 - y / eps) / eps : 0; }
+
 /// Derivative by the slip velocity v of w(v), where y / f1(y) w = v for y = |v|, linearised at any w (Chan, Golub & Mulet
 /// 1999); of f1(y) v / y where w is that. Symmetrised; its eigenvalues are >= 0 for |w| <= 1.
 template <int N>
@@ -52,9 +57,10 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
                                 double scale) {
   rate_ = velocity_rate;
   reference_ = velocity_reference;
-  epsv_ = options.friction_velocity;
+  epsv_ = contact.law() == ContactLaw::adhesion ? options.adhesion.velocity : options.friction_velocity;
   scale_ = scale;
   is_primal_dual_ = false;
+  lets_go_ = contact.law() == ContactLaw::adhesion;
   pairs_.clear();
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
@@ -65,8 +71,9 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .coefficients = q.coefficients,
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0};
-    pair.force =
-        options.friction_coefficient * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
+    pair.force = lets_go_ ? options.adhesion.tangential_coefficient * s.weight * contact.largest_pull()
+                          : options.friction_coefficient * s.weight * contact.stiffness() *
+                                -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
   }
 }
@@ -134,7 +141,7 @@ void FrictionEnergy<Dim>::relax(const FrictionEnergy& before, double factor) {
 template <int Dim>
 double FrictionEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
-  for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_);
+  for (const auto& pair : pairs_) sum += pair.force * (lets_go_ ? fading_f0 : f0)(slip_velocity(pair, x).norm(), epsv_);
   return scale_ / rate_ * sum;
 }
 
@@ -142,7 +149,8 @@ template <int Dim>
 void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const Vec<Dim> force = scale_ * pair.force * f1_over_y(v.norm(), epsv_) * (pair.tangents * v);
+    const Vec<Dim> force =
+        scale_ * pair.force * (lets_go_ ? fading_f1_over_y : f1_over_y)(v.norm(), epsv_) * (pair.tangents * v);
     for (int k = 0; k < pair.size; ++k) gradient.segment<Dim>(Dim * pair.vertices[k]) += pair.coefficients[k] * force;
   }
 }
@@ -152,13 +160,16 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4 * Dim, 4 * Dim> block;
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const double y = v.norm(), isotropic = f1_over_y(y, epsv_);
-    // Along v the second derivative is f2, across it f1 / y; both are >= 0, so only the sign of the force can spoil it.
+    const double y = v.norm(), isotropic = (lets_go_ ? fading_f1_over_y : f1_over_y)(y, epsv_);
+    // Along v the second derivative is f2, across it f1 / y. Friction's are >= 0, so only the sign of the force can spoil
+    // it.
+    double along = lets_go_ ? fading_f2(y, epsv_) : f2(y, epsv_);
+    if (psd != PsdProjection::none) along = std::max(along, 0.0);
     Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
     if (is_primal_dual_)
       inner = linearised_ratio<kTangents>(v, pair.ratio, epsv_);
     else if (y > 0)
-      inner += (f2(y, epsv_) - isotropic) / (y * y) * v * v.transpose();
+      inner += (along - isotropic) / (y * y) * v * v.transpose();
     const double force = projected(pair.force, psd);
     if (force == 0) continue;
     const Mat<Dim> world = scale_ * rate_ * force * pair.tangents * inner * pair.tangents.transpose();

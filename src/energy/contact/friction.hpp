@@ -8,7 +8,8 @@
 namespace itr {
 
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
-/// (docs/theory.md, "Friction").
+/// (docs/theory.md, "Friction"). Of a contact energy of ContactLaw::adhesion: what holds against sliding, of its largest
+/// pull.
 template <int Dim>
 class FrictionEnergy final : public Energy {
  public:
@@ -52,6 +53,7 @@ class FrictionEnergy final : public Energy {
   ScratchVector reference_;
   double epsv_ = 0;
   bool is_primal_dual_ = false;
+  bool lets_go_ = false;  ///< of adhesion
   double scale_ = 1;
 };
 
