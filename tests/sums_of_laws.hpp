@@ -26,6 +26,7 @@ inline const std::map<std::string, LawValues>& examples_of_laws() {
       {"IncompressibleOgden", {{30, 40}, {2.5, -3}, {200}}},
       {"IsochoricNeoHookean", {{0}, {35}}},
       {"VolumePenalty", {{150}}},
+      {"InversionBarrier", {{140}, {35}, {0.9}}},
       {"AMIPS", {{17}}},
       {"HGOFiber", {{30}, {0.7}, {0.1}}},
       {"ActiveFiber", {{12}, {0.5}}},
@@ -46,8 +47,9 @@ inline LawSum sum_of(const LawRow& row, int dimension, bool is_plane_stress) {
       }
   };
   const std::string type = row.type;
-  if (type == "VolumePenalty" || row.fibre) add("IsochoricNeoHookean");
-  if (type == "IsochoricNeoHookean" || type == "AMIPS" || row.fibre) add("VolumePenalty");
+  const bool is_added = row.fibre || type == "InversionBarrier";
+  if (type == "VolumePenalty" || is_added) add("IsochoricNeoHookean");
+  if (type == "IsochoricNeoHookean" || type == "AMIPS" || is_added) add("VolumePenalty");
   add(type);
   return sum;
 }

@@ -49,6 +49,7 @@ TermFactory<2> push(const Vec<2>& force) {
 TrialScene scene_of_all_terms() {
   TrialScene scene(1, 6, {.friction = true, .pressure = true, .damping = true});
   scene.context.contact.dhat = 0.1;  // to the obstacle and beyond
+  scene.context.contact.adhesion = {.strength = 1, .peak = 0.05, .reach = 0.1, .tangential_coefficient = 0.3};
   scene.context.host.push_back(push({1, 0}));
   scene.context.loads.cavities = {{{3}, 0.5, 1, 1.4, 0}};
   scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
@@ -102,6 +103,9 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
       {TermKind::contact, [](auto& c) { c.contact.enabled = false; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_coefficient = 0; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_iterations = 0; }},
+      {TermKind::adhesion, [](auto& c) { c.contact.adhesion.strength = 0; }},
+      {TermKind::adhesive_friction, [](auto& c) { c.contact.adhesion.tangential_coefficient = 0; }},
+      {TermKind::adhesive_friction, [](auto& c) { c.contact.adhesion.iterations = 0; }},
       {TermKind::pressure, [](auto& c) { c.loads.pressures.clear(); }},
       {TermKind::cavity, [](auto& c) { c.loads.cavities.clear(); }},
       {TermKind::damping, [](auto& c) { c.damping.clear(); }},

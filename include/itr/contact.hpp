@@ -38,16 +38,22 @@ ITR_EXPORT std::shared_ptr<const CollisionSurface> collision_surface(std::vector
                                                                      std::span<const Vec<Dim>> rest,
                                                                      std::vector<char> counts);
 
+/// Law of the pairs: the barrier, or the pull of AdhesionOptions.
+enum class ContactLaw { barrier, adhesion };
+
 /// The energy scale * kappa * sum of weight * m * b(D). b(D) = -(D - dhat^2)^2 ln(D / dhat^2) for squared distances D below
-/// dhat^2, and m is the mollifier of nearly parallel edges.
+/// dhat^2, and m is the mollifier of nearly parallel edges. With ContactLaw::adhesion b is the energy of its pull, dhat its
+/// reach and kappa 1.
 template <int Dim>
 class ITR_EXPORT ContactEnergy final : public Energy {
  public:
   /// `surface` must outlive this object. `scale` is alpha h^2 [s^2]. A workspace serves one surface; another surface needs a
   /// new workspace or a new revision.
-  ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
+  ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale,
+                ContactLaw law = ContactLaw::barrier);
   /// Resets this object as if it were constructed anew.
-  void renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale);
+  void renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness, double scale,
+             ContactLaw law = ContactLaw::barrier);
   std::string_view name() const override { return "contact"; }
   double value(ConstVectorView x, Workspace& workspace) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override;
@@ -79,6 +85,8 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   double barrier(double squared_distance) const;
   double barrier_first(double squared_distance) const;
   double barrier_second(double squared_distance) const;
+  ContactLaw law() const { return law_; }
+  double largest_pull() const;  ///< of adhesion, at its peak, for a pair of weight 1 [N]
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
   const CollisionSurface& surface() const { return *surface_; }
@@ -96,6 +104,8 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   bool convergent_;
   double stiffness_;
   double scale_;
+  ContactLaw law_;
+  double peak_, slope_;  ///< of adhesion: squared distance of its largest pull, a2
 };
 
 }  // namespace itr

@@ -54,6 +54,7 @@ struct Material {
   bool plane_strain = false;    ///< 2D: lambda = E nu / ((1 + nu)(1 - 2 nu)) instead of nu E / (1 - nu^2)
   MooneyRivlinModuli mooney_rivlin{};
   std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
+  std::function<std::shared_ptr<const OwnLaw>(double t)> own_at{};  ///< that at time t [s] instead; empty: `own` always
 
   /// Functions that replace the constants above, sampled at the rest barycentre of each element. Empty: the constant.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};
@@ -85,6 +86,19 @@ struct FrictionPair {
 };
 inline constexpr int kMostFrictionPairs = 32;
 
+/// Adhesion in the form of Fang et al. 2023 (docs/theory.md, "Adhesion").
+struct AdhesionOptions {
+  double strength = 0;                ///< Y, of the largest pull; 0: none
+  double peak = 1e-3;                 ///< distance of the largest pull [m]
+  double reach = 1e-2;                ///< distance from which on nothing pulls [m]
+  double tangential_coefficient = 0;  ///< of the largest pull: what holds against sliding
+  double velocity = 1e-3;             ///< eps_a [m/s]: sliding twice as fast is not held
+  int iterations = 1;                 ///< as ContactOptions::friction_iterations
+  /// PolyFEM's way: alpha h^2, which multiplies all other energies of a step, is left out, so that strengths act divided by
+  /// it.
+  bool is_by_step = false;
+};
+
 /// Contact and friction (IPC). docs/theory.md, "Contact", has the exact sums.
 struct ContactOptions {
   bool enabled = false;
@@ -108,6 +122,9 @@ struct ContactOptions {
   bool has_static_friction() const {
     return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.kinetic < p.statics; });
   }
+  AdhesionOptions adhesion{};
+
+  bool has_adhesion() const { return enabled && adhesion.strength > 0; }
 };
 
 // Damping.

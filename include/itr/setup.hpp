@@ -127,6 +127,13 @@ struct FollowsStoredEnergy {
   bool split = false, collapse = false, swap = false, smooth = false;
 };
 
+/// Statics: half the weight [N/m] times |x - x0|^2 in the first rounds of a solve, x0 where the round begins. Nothing of it
+/// is left where more rounds follow.
+struct LaggedRegularization {
+  double weight = 0;
+  int rounds = 1;
+};
+
 /// The part of a setup that does not depend on the mesh: materials, conditions, options.
 template <int Dim>
 struct ITR_EXPORT StepSetup {
@@ -138,6 +145,8 @@ struct ITR_EXPORT StepSetup {
   std::vector<PressureCondition<Dim>> pressure;
   std::vector<Cavity> cavities;
   SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none
+
+  std::vector<TermFactory<Dim>> nodal_loads;  ///< dead loads on vertices, as point_forces makes them
 
   TimeOptions time;
   ContactOptions contact;
@@ -154,6 +163,7 @@ struct ITR_EXPORT StepSetup {
   /// of the largest. Where they do not get there the step is cut, or where it may not, a warning says so. 0: rounds as
   /// ContactOptions and DampingOptions say. A number of friction_iterations limits them.
   double lagging_tolerance = 0;
+  LaggedRegularization lagged_regularization;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on cells with curved edges: 1 to 5
 
   Units units;  ///< that messages and results are to be in; all numbers here are in SI units

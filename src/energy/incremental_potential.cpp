@@ -48,6 +48,8 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
     cavities_.push_back(std::make_shared<CavityEnergy<Dim>>(cells_, cavity, terms.scaling));
   map_.reset();
   contact_of_cells_.reset();
+  adhesion_.reset();
+  adhesion_of_cells_.reset();
   if (contact_) spare_contact_ = std::move(contact_);
   host_.clear();
   for (const auto& make : terms.host)
@@ -65,6 +67,9 @@ void IncrementalPotential<Dim>::add_contact(const CollisionSurface& surface, dou
     contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_->contact, stiffness, terms_->scaling);
   }
   contact_of_cells_ = of_cells(contact_);
+  if (!is_in(TermKind::adhesion, *terms_)) return;
+  adhesion_ = std::make_shared<AdhesionEnergy<Dim>>(surface, terms_->contact, adhesion_scaling());
+  adhesion_of_cells_ = of_cells(adhesion_);
 }
 
 /// A term over the vertices of the surface as one over those of the cells.
@@ -102,6 +107,10 @@ template <int Dim>
 typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstVectorView x, Workspace& workspace) const {
   Lagged lagged;
   lag_friction(x, workspace, lagged);
+  if (adhesion_ && is_in(TermKind::adhesive_friction, *terms_))
+    lagged.adhesive_friction = of_cells(
+        std::make_shared<FrictionEnergy<Dim>>(adhesion_->pairs(), on_surface(x), AdhesionEnergy<Dim>::inner(workspace),
+                                              terms_->contact, velocity_of_surface(), adhesion_scaling()));
   if (is_in(TermKind::pressure, *terms_)) {
     lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_->loads, x, terms_->scaling);
     if (lagged.pressure->empty()) lagged.pressure.reset();

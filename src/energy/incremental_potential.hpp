@@ -11,6 +11,7 @@
 #include "energy/damping.hpp"
 #include "energy/elastic/elastic.hpp"
 #include "energy/inertia.hpp"
+#include "energy/polyfem/adhesion.hpp"
 #include "energy/pressure.hpp"
 #include "energy/terms.hpp"
 #include "fem/vertex_map.hpp"
@@ -41,13 +42,14 @@ class IncrementalPotential {
   struct Lagged {
     std::shared_ptr<const Energy> friction;
     std::shared_ptr<FrictionEnergy<Dim>> friction_of_surface;  ///< the same, over the surface's vertices
+    std::shared_ptr<const Energy> adhesive_friction;
     std::shared_ptr<PressureEnergy<Dim>> pressure;
     std::vector<std::shared_ptr<const Energy>> damping, contact_damping;
     std::shared_ptr<const Energy> follower;
   };
   /// Makes the terms that are lagged at x.
   Lagged lag(ConstVectorView x, Workspace& workspace) const;
-  /// Makes friction alone anew, lagged at x.
+  /// Makes friction of contact alone anew, lagged at x.
   void lag_friction(ConstVectorView x, Workspace& workspace, Lagged& lagged) const;
   bool has_friction() const;
   VectorX on_surface(ConstVectorView x) const { return map_ ? map_->positions(x) : VectorX(x); }
@@ -64,7 +66,9 @@ class IncrementalPotential {
     for (const auto& term : host_) visit(TermKind::host, term);
     visit(TermKind::follower, lagged.follower);
     visit(TermKind::contact, contact_of_cells_);
+    visit(TermKind::adhesion, adhesion_of_cells_);
     visit(TermKind::friction, lagged.friction);
+    visit(TermKind::adhesive_friction, lagged.adhesive_friction);
     visit(TermKind::pressure, lagged.pressure);
     for (const auto& term : cavities_) visit(TermKind::cavity, term);
     for (const auto& term : lagged.damping) visit(TermKind::damping, term);
@@ -89,6 +93,7 @@ class IncrementalPotential {
 
  private:
   std::shared_ptr<const Energy> of_cells(std::shared_ptr<const Energy> term) const;
+  double adhesion_scaling() const { return terms_->contact.adhesion.is_by_step ? 1 : terms_->scaling; }
   VelocityRule velocity() const { return {terms_->velocity_rate, velocity_reference_.view()}; }
   VelocityRule velocity_of_surface() const { return {terms_->velocity_rate, on_surface(velocity_reference_.view())}; }
 
@@ -102,6 +107,8 @@ class IncrementalPotential {
   std::vector<std::shared_ptr<const Energy>> cavities_;
   std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed
   std::shared_ptr<const Energy> contact_of_cells_;
+  std::shared_ptr<AdhesionEnergy<Dim>> adhesion_;  ///< over the surface's vertices
+  std::shared_ptr<const Energy> adhesion_of_cells_;
   std::vector<std::shared_ptr<const Energy>> host_;
 };
 

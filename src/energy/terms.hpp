@@ -46,13 +46,15 @@ enum class TermKind {
   host,
   follower,
   contact,
+  adhesion,
   friction,
+  adhesive_friction,
   pressure,
   cavity,
   damping,
   contact_damping
 };
-inline constexpr std::size_t kNumTermKinds = 11;
+inline constexpr std::size_t kNumTermKinds = 13;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -147,12 +149,30 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },  // the surface is its own
      .is_between_bodies = true,
      .is_stored = true},
+    {.kind = TermKind::adhesion,
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.contact.has_adhesion(); },
+     .energy = EnergyEntry::contact,
+     .force = ForceEntry::contact,
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .is_between_bodies = true,
+     .is_stored = true},
     {.kind = TermKind::friction,
      .is_in = [](const PotentialTerms<Dim>& terms) { return terms.contact.has_friction(); },
      .energy = EnergyEntry::friction,
      .force = ForceEntry::friction,
      .in_predictions = InPredictions::left_out,
      .is_bounded = [](const PotentialTerms<Dim>&) { return true; },
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .needs_velocities = true,
+     .is_between_bodies = true},
+    {.kind = TermKind::adhesive_friction,
+     .is_in =
+         [](const PotentialTerms<Dim>& terms) {
+           const AdhesionOptions& adhesion = terms.contact.adhesion;
+           return terms.contact.has_adhesion() && adhesion.tangential_coefficient > 0 && adhesion.iterations != 0;
+         },
+     .energy = EnergyEntry::friction,
+     .force = ForceEntry::friction,
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .needs_velocities = true,
      .is_between_bodies = true},

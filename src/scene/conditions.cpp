@@ -2,10 +2,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <set>
 
 #include "function.hpp"
 #include "readers.hpp"
+#include "selection_file.hpp"
 
 namespace itr::scene {
 
@@ -32,6 +37,8 @@ class ConditionReader {
     read_body_acceleration();
     read_dirichlet();
     read_neumann();
+    read_normal_neumann();
+    read_nodal_neumann();
     read_pressure();
     read_cavities();
     read_motions(geometry);
@@ -61,12 +68,46 @@ class ConditionReader {
   void read_body_acceleration() {
     const Node rhs = boundary_["rhs"];
     if (!rhs.exists()) return;
+    const std::vector<Node> items = rhs.items();
+    if (!items.empty() && items.front().json().is_object()) return read_accelerations_of_bodies(items);
     warn_of_components(rhs, Dim, warnings_);
     const ValueFunction<Dim> value = read_function<Dim>(rhs, -1);
     if (value.is_zero) return;
     check_defined<Dim>(value.function, all_vertices(), times(), rhs);
     end_steps_at_kinks(rhs, rhs["interpolation"]);
     setup_.body_acceleration = value.function;
+  }
+
+  /// One for each of several bodies, which then share no vertices: a point's connected part tells whose it is.
+  void read_accelerations_of_bodies(const std::vector<Node>& items) {
+    std::map<int, std::set<int>> bodies;  // by part
+    for (CellId c = 0; c < setup_.mesh.cell_slots(); ++c) bodies[setup_.mesh.part(c)].insert(setup_.mesh.body(c));
+    std::map<int, Function> of_part;
+    std::set<int> seen;
+    for (const Node& item : items) {
+      const Node value = item["value"];
+      warn_of_components(value, Dim, warnings_);
+      const ValueFunction<Dim> function = read_function<Dim>(value, -1);
+      end_steps_at_kinks(value, value["interpolation"]);
+      for (const int body : bodies_of(item["id"])) {
+        if (!seen.insert(body).second) {
+          warnings_.push_back(item.pointer() + ": an entry before it has the same id and wins");
+          continue;
+        }
+        check_defined<Dim>(function.function, vertices_of_body(body), times(), value);
+        for (const auto& [part, of_it] : bodies) {
+          if (!of_it.contains(body)) continue;
+          if (of_it.size() > 1)
+            item["id"].fail(abbreviate(item["id"].json()) + ", a body that shares vertices with others",
+                            "bodies that share none, or one rhs for all");
+          of_part.emplace(part, function.function);
+        }
+      }
+    }
+    setup_.body_acceleration = [of_part](const RestPoint<Dim>& X, double t) {
+      const auto found = of_part.find(X.part);
+      return found == of_part.end() ? Vec<Dim>(Vec<Dim>::Zero()) : found->second(X, t);
+    };
   }
 
   /// Facets of several sets have conditions of each: in each component that of the first entry counts.
@@ -164,6 +205,67 @@ class ConditionReader {
         load(setup_.neumann, {tag, value.function}, &NeumannCondition<Dim>::traction);
       }
     }
+  }
+
+  /// Tractions along the outward normals at rest, positive: pulls.
+  void read_normal_neumann() {
+    Seen seen;
+    for (const Node& node : boundary_["normal_aligned_neumann_boundary"].items()) {
+      if (!setup_.time.is_static)
+        node.fail("it with /time",
+                  "a static scene, where normals are those at rest; pressure_boundary follows them in time");
+      warn_of_interpolation(node["interpolation"]);
+      const ScalarFunction<Dim> value = read_scalar_function<Dim>(node["value"], node["interpolation"]);
+      const Function along_normal = [f = value.function](const RestPoint<Dim>& X, double t) {
+        return Vec<Dim>(-f(X, t) * X.inward.stableNormalized());
+      };
+      for (const int tag : loaded_tags(node, seen)) {
+        check_defined<Dim>(along_normal, vertices_with(tag), times(), node["value"]);
+        if (!value.is_zero) load(setup_.neumann, {tag, along_normal}, &NeumannCondition<Dim>::traction);
+      }
+    }
+  }
+
+  /// Forces on the vertices of a point_selection; one function for all, since the mesh is searched for it.
+  void read_nodal_neumann() {
+    std::map<VertexId, Function> forces;
+    for (const Node& node : boundary_["nodal_neumann_boundary"].items()) {
+      warn_of_interpolation(node["interpolation"]);
+      warn_of_components(node["value"], Dim, warnings_);
+      const Function function = read_value(node);
+      end_steps_at_kinks(node["value"], node["interpolation"]);
+      const std::vector<int>& tags = ids_of(node["id"]);
+      if (std::none_of(tags.begin(), tags.end(), [&](int tag) { return point_tags_.contains(tag); }))
+        sets_.surfaces.refuse(node["id"], read_condition_label(node["id"]),
+                              "the id of a point_selection: ", why_unused(node["id"]));
+      std::vector<Vec<Dim>> loaded;
+      for (VertexId v = 0; v < setup_.mesh.num_vertices(); ++v) {
+        if (std::find(tags.begin(), tags.end(), setup_.mesh.vertex_tag(v)) == tags.end()) continue;
+        if (!forces.emplace(v, function).second) continue;
+        loaded.push_back(setup_.mesh.rest(v));
+      }
+      check_defined<Dim>(function, loaded, times(), node["value"]);
+    }
+    if (!forces.empty()) setup_.nodal_loads.push_back(make_nodal_load(setup_.mesh, std::move(forces)));
+  }
+
+  /// Remembers the term of the last time, which patches ask for, too.
+  static TermFactory<Dim> make_nodal_load(Mesh<Dim> mesh, std::map<VertexId, Function> forces) {
+    struct Last {
+      std::mutex mutex;
+      double t = std::numeric_limits<double>::quiet_NaN();
+      TermFactory<Dim> term;
+    };
+    return [=, last = std::make_shared<Last>()](const CellSet<Dim>& cells, double t, double scale) {
+      const std::lock_guard lock(last->mutex);
+      if (last->t != t) {
+        VectorX nodal = VectorX::Zero(Dim * mesh.num_nodes());
+        for (const auto& [v, force] : forces) nodal.template segment<Dim>(Dim * v) = force(mesh.rest(v), t);
+        last->term = point_forces<Dim>(mesh, nodal);
+        last->t = t;
+      }
+      return last->term(cells, t, scale);
+    };
   }
 
   void read_pressure() {
@@ -303,13 +405,10 @@ class ConditionReader {
     std::set<Label> seen;
     std::set<int> taken;
     for (const Node& node : initial_[name].items()) {
-      if (!node.has("id")) node["id"].fail("the id of a body");
-      const Label label = read_label(node["id"], 0);
       warn_of_components(node["value"], Dim, warnings_);
       const ValueFunction<Dim> value = read_function<Dim>(node["value"]);
-      const std::vector<int>& bodies = sets_.bodies.of(label);
-      if (bodies.empty()) sets_.bodies.refuse(node["id"], label, "the id of a body: ");
-      bool is_new = seen.insert(label).second;
+      const std::vector<int>& bodies = bodies_of(node["id"]);
+      bool is_new = seen.insert(read_label(node["id"], 0)).second;
       for (const int body : bodies) {
         if (!taken.insert(body).second) {
           is_new = false;
@@ -321,6 +420,13 @@ class ConditionReader {
       if (!is_new) warnings_.push_back(node.pointer() + ": an entry before it has the same id and wins");
     }
     return conditions;
+  }
+
+  const std::vector<int>& bodies_of(const Node& id) const {
+    if (!id.exists()) id.fail("the id of a body");
+    const Label label = read_label(id, 0);
+    if (sets_.bodies.of(label).empty()) sets_.bodies.refuse(id, label, "the id of a body: ");
+    return sets_.bodies.of(label);
   }
 
   Function read_value(const Node& node) const { return read_function<Dim>(node["value"], node["interpolation"]).function; }
@@ -384,6 +490,10 @@ class ConditionReader {
     }
     const Label label = read_condition_label(node["id"]);
     const bool is_zero = label.name.empty() && label.number <= 0;
+    if (ids_of(node["id"]).empty() && label.name.empty() && has_ids_of_files()) {
+      warnings_.push_back(node["id"].pointer() + ": " + text_of(label) + ", which nothing has: the entry does nothing");
+      return taken;
+    }
     if ((ids_of(node["id"]).empty() || is_zero) && obstacle_of(node["id"]) == kNoTag)
       sets_.surfaces.refuse(node["id"], label, "the id of a surface or an obstacle, above 0: ", why_unused(node["id"]));
     if (seen.has_all || !seen.labels.insert(label).second) {
@@ -394,6 +504,12 @@ class ConditionReader {
       if (!is_zero && tags.contains(tag)) taken.push_back(tag);
     seen.tags.insert(taken.begin(), taken.end());
     return taken;
+  }
+
+  /// Whether files of ids say what is selected: then conditions may be those of several meshes.
+  bool has_ids_of_files() const {
+    const std::vector<Node> geometries = geometry_.items();
+    return std::any_of(geometries.begin(), geometries.end(), has_selection_files);
   }
 
   /// The warning that was given of a selection which would have this id if anything were in it.

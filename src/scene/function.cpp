@@ -9,6 +9,7 @@
 
 #include "expression.hpp"
 #include "interpolation.hpp"
+#include "polyfem/python_value.hpp"
 
 namespace itr::scene {
 
@@ -48,18 +49,20 @@ struct SceneUnits {
   }
 };
 
-/// One component: a number, or an expression where there are variables in it; times g(t).
+/// One component: a number, an expression where there are variables in it, or a function of Python; times g(t).
 struct Component {
   double constant = 0;
-  double unit = 1;  ///< of the expression's values
+  double unit = 1;  ///< of the values of expressions and of Python
   std::optional<Expression> expression;
+  std::function<double(double x, double y, double z, double t)> python;
   Interpolation scale;
 
   double operator()(const Expression::Variables& variables) const {
-    const double value = expression ? unit * (*expression)(variables) : constant;
+    double value = expression ? unit * (*expression)(variables) : constant;
+    if (python) value = unit * python(variables.x, variables.y, variables.z, variables.t);
     return scale.is_one() ? value : value * scale(variables.t);
   }
-  bool is_constant() const { return !expression && (scale.is_one() || constant == 0); }
+  bool is_constant() const { return !expression && !python && (scale.is_one() || constant == 0); }
 };
 
 Component read_component(const Node& node) {
@@ -73,8 +76,11 @@ Component read_component(const Node& node) {
       component.constant = component.unit * expression({});
     else
       component.expression = std::move(expression);
+  } else if (is_python_value(node.json())) {
+    component.unit = node.document().units.factor(node.unit());
+    component.python = read_python_value(node);
   } else {
-    node.fail("a number or an expression");
+    node.fail("a number, an expression, or a function of a Python file");
   }
   if (!std::isfinite(component.constant))
     node.fail(abbreviate(node.json()) + ", which has no finite value", "one with a value");

@@ -16,6 +16,7 @@
 #include "file_parts.hpp"
 #include "mesh/refine.hpp"
 #include "selection.hpp"
+#include "selection_file.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {
@@ -259,8 +260,12 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, K
 }
 
 template <int Dim>
-void read_body(const Node& geometry, const MeshFile& file, const References& references, Sets& sets, Collected<Dim>& all,
+void read_body(const Node& geometry, const MeshFile& of_mesh, const References& references, Sets& sets, Collected<Dim>& all,
                std::vector<std::string>& warnings) {
+  const bool has_files = has_selection_files(geometry);
+  MeshFile with_selections;
+  if (has_files) add_selection_files(geometry, Dim, with_selections = of_mesh);
+  const MeshFile& file = has_files ? with_selections : of_mesh;
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
   const bool is_mirror = transform<Dim>(points, geometry);

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <sstream>
 #include <utility>
 
@@ -24,11 +29,13 @@ struct LawName {
 
 std::vector<LawName> name_laws() {
   const std::vector<std::string> linear = {"E", "nu", "lambda", "mu", "plane_strain"};
+  std::vector<std::string> tensor = linear;
+  tensor.insert(tensor.end(), {"elasticity_tensor", "fiber_direction"});
   std::vector<LawName> laws = {
       {"NeoHookean", MaterialLaw::neo_hookean, linear},
       {"LinearElasticity", MaterialLaw::linear, linear},
-      {"HookeLinearElasticity", MaterialLaw::linear, linear},  // from E and nu its C is that of the Lame parameters
-      {"SaintVenant", MaterialLaw::saint_venant_kirchhoff, linear},
+      {"HookeLinearElasticity", MaterialLaw::linear, tensor},  // from E and nu its C is that of the Lame parameters
+      {"SaintVenant", MaterialLaw::saint_venant_kirchhoff, tensor},
       {"FixedCorotational", MaterialLaw::fixed_corotated, linear},
       {"MooneyRivlin", MaterialLaw::mooney_rivlin, {"c1", "c2", "k"}},
       {"MooneyRivlin3Param", MaterialLaw::mooney_rivlin, {"c1", "c2", "c3", "d1"}},
@@ -159,22 +166,42 @@ class SumReader {
     if (std::string_view(row.type) == "AMIPS" && !node["use_rest_pose"].boolean(false))
       node["use_rest_pose"].fail("true: else the energy would depend on the mesh, which remeshing changes");
     if (!row.fibre) return term;
+    if (is_activation(node["activation"])) term.share = read_share(node["activation"]);
     if (sum.is_plane_stress) node_["plane_stress"].fail("true, with fibres", "false: fibres are in plane strain only");
     term.direction = read_direction(node["fiber_direction"]);
     return term;
   }
 
+  /// Whether it is an expression, which may vary in space and time.
+  static bool is_activation(const Node& value) {
+    return value.exists() && value.json().is_string() && value.pointer().ends_with("/activation");
+  }
+  static std::function<double(const Vec<3>&, double)> read_share(const Node& node) {
+    InputError::Parts parts{node.document().file.string(), node.pointer(), abbreviate(node.json()), "values of [0, 1]"};
+    return [f = read_scalar_function<3>(node, node["no such key"]).function, parts](const Vec<3>& X, double t) {
+      const double share = f(X, t);
+      if (share >= 0 && share <= 1) return share;
+      InputError::Parts wrong = parts;
+      wrong.found = fmt::format("{}, which is {} somewhere", parts.found, share);
+      throw InputError(wrong);
+    };
+  }
+
   /// As the row lists them.
   static LawValues read_coefficients(const Node& node, const LawRow& row, bool in_sum, int dimension) {
+    LawValues values;
     if (row.has_lame && (node.has("E") || node.has("nu"))) {
       if (node.has("lambda") || node.has("mu")) node.fail("E and nu, or lambda and mu, not both");
       const double E = read_in_range(node["E"], LawCoefficient::Range::positive);
       const double nu = read_in_range(node["nu"], LawCoefficient::Range::compressible);
-      return {{Material{.plane_strain = dimension == 3}.lame_lambda(E, nu, dimension)}, {Material::lame_mu(E, nu)}};
+      values = {{Material{.plane_strain = dimension == 3}.lame_lambda(E, nu, dimension)}, {Material::lame_mu(E, nu)}};
     }
-    LawValues values;
-    for (const LawCoefficient& coefficient : row.coefficients) {
+    for (const LawCoefficient& coefficient : std::span(row.coefficients).subspan(values.size())) {
       const Node value = node[coefficient.key];
+      if (is_activation(value)) {
+        values.push_back({1});
+        continue;
+      }
       if (!value.exists() && coefficient.fallback) {
         values.push_back({*coefficient.fallback});
       } else if (!value.exists() && in_sum && std::string_view(coefficient.key) == "K") {
@@ -231,18 +258,24 @@ class SumReader {
 
 class MaterialReader {
  public:
-  /// `invariants`: the dimension of sums' invariants.
-  MaterialReader(const Node& node, int dimension, int invariants) : node_(node), dimension_(dimension) {
+  /// `is_polyfem`: as PolyFEM, which has invariants of two dimensions in 2D.
+  MaterialReader(const Node& node, int dimension, bool is_polyfem)
+      : node_(node), dimension_(dimension), shear_factor_(is_polyfem ? 2 : 1) {
     const LawName& law = read_law(node, false);
     material_.law = law.law;
     if (law.law == MaterialLaw::mooney_rivlin)
       read_mooney_rivlin();
     else if (law.law == MaterialLaw::own)
-      read_sum(law, invariants);
+      read_sum(law, is_polyfem ? dimension : 3);
+    else if (node.has("elasticity_tensor"))
+      read_tensor();
     else if (node.has("lambda") || node.has("mu"))
       read_lame();
     else
       read_moduli();
+    // An isotropic law is the same in all directions.
+    if ((law.law == MaterialLaw::linear || law.law == MaterialLaw::saint_venant_kirchhoff) && has_directions())
+      read_directions();
     require("rho", read_scalar(node["rho"], 1), is_positive, "a number > 0");
     material_.density = requirements_.back().value.constant;
     material_.density_at = requirements_.back().value.function;
@@ -386,16 +419,94 @@ class MaterialReader {
     if (!(shear > 0)) refuse("shear", shear);
     if (!(bulk > 0)) refuse("bulk", bulk);
     material_ = material_of(sum, dimension_);
+    const auto has_share = [](const LawSum::Term& term) { return static_cast<bool>(term.share); };
+    if (std::any_of(sum.terms.begin(), sum.terms.end(), has_share)) {
+      material_.own_at = [own = std::static_pointer_cast<const LawSum>(material_.own)](double t) {
+        auto at_t = std::make_shared<LawSum>(*own);
+        at_t->time = t;
+        return at_t;
+      };
+      ask_for_each_place();
+    }
     for (Requirement& requirement : reader.requirements()) {
-      // A modulus that varies makes everybody ask for the law of each place.
-      if (requirement.value.function)
-        material_.youngs_modulus_at = [E = material_.youngs_modulus](const Vec<3>&) { return E; };
+      if (requirement.value.function) ask_for_each_place();
       requirements_.push_back(std::move(requirement));
     }
   }
 
+  /// A modulus that varies makes everybody ask for the law of each place.
+  void ask_for_each_place() {
+    material_.youngs_modulus_at = [E = material_.youngs_modulus](const Vec<3>&) { return E; };
+  }
+
+  /// A law of all anisotropy by its entries, turned by a matrix of directions.
+  void read_tensor() {
+    const Node list = node_["elasticity_tensor"];
+    for (const char* key : {"E", "nu", "lambda", "mu"})
+      if (node_.has(key)) node_[key].fail("it beside elasticity_tensor", "one of the two");
+    const MatrixX C = stiffness_of(list, list.numbers());
+    if (!(C.selfadjointView<Eigen::Upper>().eigenvalues().minCoeff() > 0))
+      list.fail(abbreviate(list.json()) + ", of a stiffness that is not positive definite", "one that is");
+    material_ = tensor_material(has_directions() ? turned(C, read_directions()) : C, material_.law == MaterialLaw::linear);
+  }
+
+  MatrixX stiffness_of(const Node& list, const std::vector<double>& entries) const {
+    const Eigen::Index rows = dimension_ == 2 ? 3 : 6;
+    MatrixX C = MatrixX::Zero(rows, rows);
+    if (static_cast<Eigen::Index>(entries.size()) == rows * (rows + 1) / 2) {  // row by row of the upper triangle
+      for (Eigen::Index i = 0, k = 0; i < rows; ++i)
+        for (Eigen::Index j = i; j < rows; ++j, ++k) C(i, j) = C(j, i) = entries[static_cast<std::size_t>(k)];
+      return C;
+    }
+    // PolyFEM's shear moduli in the orthotropic form count twice.
+    const double shears = shear_factor_;
+    if (dimension_ == 2 && entries.size() == 4) {
+      const double E1 = entries[0], E2 = entries[1], nu12 = entries[2];
+      C.topLeftCorner(2, 2) << 1 / E1, -nu12 / E1, -nu12 / E1, 1 / E2;
+      C(2, 2) = 1 / (shears * entries[3]);
+    } else if (dimension_ == 3 && entries.size() == 9) {
+      const double E1 = entries[0], E2 = entries[1], E3 = entries[2], nu12 = entries[3], nu13 = entries[4],
+                   nu23 = entries[5];
+      C.topLeftCorner(3, 3) << 1 / E1, -nu12 / E1, -nu13 / E1, -nu12 / E1, 1 / E2, -nu23 / E2, -nu13 / E1, -nu23 / E2,
+          1 / E3;
+      for (int k = 0; k < 3; ++k) C(3 + k, 3 + k) = 1 / (shears * entries[static_cast<std::size_t>(6 + k)]);
+    } else if (dimension_ == 3 && entries.size() == 5) {
+      const double Et = entries[0], Ea = entries[1], nu_t = entries[2], nu_a = entries[3], Ga = entries[4];
+      C.topLeftCorner(3, 3) << 1 / Et, -nu_t / Et, -nu_a / Ea, -nu_t / Et, 1 / Et, -nu_a / Ea, -nu_a / Ea, -nu_a / Ea,
+          1 / Ea;
+      C(3, 3) = C(4, 4) = 1 / Ga;
+      C(5, 5) = 2 * (1 + nu_t) / Et;
+    } else {
+      list.fail(dimension_ == 2
+                    ? "6 entries of the stiffness row by row, or 4: E1, E2, nu12, G12"
+                    : "21 entries of the stiffness row by row, or 9: E1, E2, E3, nu12, nu13, nu23, G23, G13, G12, "
+                      "or 5: E across the axis 3, E along it, nu across, nu along, G along");
+    }
+    return C.inverse();
+  }
+
+  bool has_directions() const { return node_.has("fiber_direction") && !node_["fiber_direction"].json().empty(); }
+  /// An orthogonal matrix: its columns are the axes of the material.
+  MatrixX read_directions() const {
+    const Node list = node_["fiber_direction"];
+    std::vector<double> entries;
+    for (const Node& row : list.items())
+      for (const Node& entry : row.items()) {
+        if (!entry.json().is_number()) entry.fail("a number: directions that vary are of HGOFiber and ActiveFiber only");
+        entries.push_back(entry.number(0));
+      }
+    const Eigen::Index n = dimension_;
+    constexpr double kOrthogonal = 1e-6;
+    if (static_cast<Eigen::Index>(entries.size()) == n * n) {
+      const MatrixX R = Eigen::Map<const MatrixX>(entries.data(), n, n).transpose();
+      if ((R * R.transpose() - MatrixX::Identity(n, n)).norm() < kOrthogonal) return R;
+    }
+    list.fail("the rows of an orthogonal matrix, of which the columns are the material's axes");
+  }
+
   Node node_;
   int dimension_;
+  double shear_factor_;
   Material material_;
   std::vector<Requirement> requirements_;
   std::optional<ScalarValue> lambda_, mu_;  ///< instead of E and nu
@@ -456,16 +567,16 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   for (const Node& entry : node.items())
     if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
       warnings.push_back(entry["rho"].pointer() + ": not given, so it is 1 kg/m^3");
-  const int invariants = is_polyfem_set(root) ? Dim : 3;
+  const bool is_polyfem = is_polyfem_set(root);
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
-    MaterialReader reader(node, Dim, invariants);
+    MaterialReader reader(node, Dim, is_polyfem);
     for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
   std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
-    MaterialReader reader(entry, Dim, invariants);
+    MaterialReader reader(entry, Dim, is_polyfem);
     for (const auto& [label, id] : ids_of(entry, bodies, points)) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);

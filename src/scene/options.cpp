@@ -6,6 +6,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "defaults.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -200,6 +201,25 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   if (!is_from_bodies && !options.adaptive_stiffness) options.barrier_stiffness = unit * stiffness.positive(1);
   options.friction_iterations = solver["friction_iterations"].integer(1);
   options.friction_tolerance = solver["friction_convergence_tol"].non_negative(1e-2);
+  const Node adhesion = contact["adhesion"];
+  if (!adhesion["adhesion_enabled"].boolean(false)) return options;
+  AdhesionOptions& pull = options.adhesion;
+  pull.peak = adhesion["dhat_p"].positive(pull.peak);
+  pull.reach = adhesion["dhat_a"].positive(pull.reach);
+  if (!(pull.reach > pull.peak)) adhesion["dhat_a"].fail("a distance beyond dhat_p");
+  pull.strength = adhesion["adhesion_strength"].positive(1e-3);
+  pull.tangential_coefficient = adhesion["tangential_adhesion_coefficient"].non_negative(0);
+  pull.velocity = adhesion["epsa"].positive(pull.velocity);
+  pull.iterations = solver["tangential_adhesion_iterations"].integer(pull.iterations);
+  pull.is_by_step = is_polyfem_set(root);
+  return options;
+}
+
+LaggedRegularization read_lagged_regularization(const Node& root, const TimeOptions& time,
+                                                std::vector<std::string>& warnings) {
+  const Node advanced = root["solver"]["advanced"], weight = advanced["lagged_regularization_weight"];
+  LaggedRegularization options{weight.non_negative(0), advanced["lagged_regularization_iterations"].integer_at_least(0, 1)};
+  if (options.weight > 0 && !time.is_static) warnings.push_back(weight.pointer() + ": only static scenes are regularized");
   return options;
 }
 

@@ -24,6 +24,10 @@ Document load_document(const std::filesystem::path& file, const std::vector<Over
 /// Parses a text that a program has made: paths in it are relative to the working directory, and errors call it `name`.
 Document parse_document(const std::string& text, const std::string& name, const std::vector<Override>& overrides);
 
+/// Makes values with units of their own numbers, in the units of the document. Throws InputError for other units than a
+/// key's.
+void convert_quantities(Document& document);
+
 /// Throws InputError for the first key of the document that we do not know, whose value is not what it must be, or that asks
 /// for something unsupported. Warns of what is asked for in vain.
 void check_keys(const Document& document, std::vector<std::string>& warnings);
@@ -40,6 +44,8 @@ double characteristic_length(const Node& root, const TimeOptions& time);
 
 /// `shortest_edge` of the rest surfaces, obstacles included: dhat shrinks below it unless the scene gives it (§6.1).
 ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<std::string>& warnings);
+LaggedRegularization read_lagged_regularization(const Node& root, const TimeOptions& time,
+                                                std::vector<std::string>& warnings);
 /// Extent of the bodies at rest, which tolerances are relative to.
 struct SceneScale {
   int dimension = 2;
@@ -75,6 +81,10 @@ LawSum read_law_sum(const Node& node, int dimension);
 template <int Dim>
 void read_conditions(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
                      std::vector<std::string>& warnings);
+
+/// Fills in the conditions of PolyFEM's preset problem, if there is one.
+template <int Dim>
+void read_preset_problem(const Node& root, const LabelIds& bodies, Setup<Dim>& setup);
 
 // `contact/collision_mesh`: a surface that touches in place of the bodies' boundary (docs/theory.md, "Contact").
 

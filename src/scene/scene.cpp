@@ -8,7 +8,9 @@
 #include "defaults.hpp"
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
+#include "polyfem/python_value.hpp"
 #include "readers.hpp"
+#include "selection_file.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {
@@ -81,11 +83,13 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   setup.lump_mass = read_lump_mass(root);
   setup.lagged_load_tolerance = root["solver"]["advanced"]["lagged_load_tolerance"].positive(setup.lagged_load_tolerance);
   setup.lagging_tolerance = root["solver"]["lagging_tolerance"].non_negative(0);
+  setup.lagged_regularization = read_lagged_regularization(root, setup.time, warnings);
   setup.order = read_order(root, sets.bodies, body_ids(setup.mesh));
   setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, rest_box(setup.mesh).diagonal().norm()});
   setup.materials = read_materials(root, sets.bodies, setup.mesh, warnings);
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
+  read_preset_problem<Dim>(root, sets.bodies, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 
@@ -121,12 +125,28 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   return setup;
 }
 
+/// f(name) for each name of a Python file below a node.
+template <typename Function>
+void for_each_python_file(const Node& node, const Function& f) {
+  if (!node.exists() || !node.json().is_structured()) return;
+  if (is_python_value(node.json())) return f(node["file_name"]);
+  if (node.json().is_array())
+    for (const Node& item : node.items()) for_each_python_file(item, f);
+  else
+    for (const auto& [key, value] : node.json().items()) for_each_python_file(node[key], f);
+}
+
 /// f(value, what it is) for each value of the scene that names a file.
 template <typename Function>
 void for_each_file(const Node& root, const Geometries& geometries, const Function& f) {
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
-    for (const Node& geometry : *list)
+    for (const Node& geometry : *list) {
       if (!is_flat_obstacle(geometry)) f(geometry["mesh"], MeshFiles::kMesh);
+      for (const char* selection : {"volume_selection", "surface_selection", "point_selection"})
+        if (const Node name = find_selection_file(geometry[selection]); name.exists()) f(name, "a file of ids");
+    }
+  for (const char* part : {"boundary_conditions", "initial_conditions"})
+    for_each_python_file(root[part], [&](const Node& name) { f(name, "a Python file"); });
   if (!has_collision_mesh(root)) return;
   const Node node = root["contact"]["collision_mesh"];
   f(node["mesh"], MeshFiles::kMesh);
@@ -192,6 +212,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   Scene scene;
   const Node root(document);
   document.units = read_units(root);
+  convert_quantities(document);
   check_keys(document, scene.warnings);
   MeshFiles files;
   const Json as_written = document.json;
@@ -218,6 +239,7 @@ template <int Dim>
 Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const std::vector<Override>& overrides,
                       std::vector<std::string>& warnings) {
   Document document = parse_document(options, "options", overrides);
+  convert_quantities(document);
   check_keys(document, warnings);
   apply_defaults(document);
   const Node root(document);

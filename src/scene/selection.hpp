@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "selection_file.hpp"
 #include "sets.hpp"
 #include "transformation.hpp"
 
@@ -19,6 +20,7 @@ class Selection {
  public:
   /// `box` is what relative places refer to; `node` may be absent: then nothing matches.
   Selection(const Node& node, const Box<Dim>& box) : box_(box) {
+    if (find_selection_file(node).exists()) return;  // which is in the groups of the mesh file
     for (const Node& item : node.items()) {
       rules_.push_back(read_rule(item));
       const bool has_region = item.json().is_object() && item.has("id") && item.json().size() > 1;

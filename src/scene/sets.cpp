@@ -40,7 +40,9 @@ References collect_references(const Node& root) {
   for (const Node& entry : root["space"]["discr_order"].items()) add_labels(entry["id"], references.bodies);
   for (const char* list : {"solution", "velocity", "acceleration"})
     for (const Node& entry : root["initial_conditions"][list].items()) add_labels(entry["id"], references.bodies);
-  for (const char* list : {"dirichlet_boundary", "neumann_boundary", "pressure_boundary", "obstacle_displacements"})
+  for (const Node& entry : root["boundary_conditions"]["rhs"].items()) add_labels(entry["id"], references.bodies);
+  for (const char* list : {"dirichlet_boundary", "neumann_boundary", "normal_aligned_neumann_boundary",
+                           "nodal_neumann_boundary", "pressure_boundary", "obstacle_displacements"})
     for (const Node& entry : root["boundary_conditions"][list].items()) add_labels(entry["id"], references.surfaces);
   for (const Node& entry : root["contact"]["friction_pairs"].items())
     for (const char* side : {"a", "b"})

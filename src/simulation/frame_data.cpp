@@ -138,10 +138,11 @@ double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Ve
 }
 
 template <int Dim>
-CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const QuadratureLevels& levels, const Setup<Dim>& setup) {
+CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const State<Dim>& state, const Setup<Dim>& setup) {
   CellStress stress;
-  for_each_cell_in_order<Dim>(cells, x, levels, setup.quadrature_degree, [&](const auto& element, auto points) {
-    const Material& material = setup.materials.at(element.body);
+  const std::map<int, Material> materials = materials_at(setup, state.t);
+  for_each_cell_in_order<Dim>(cells, x, state.quadrature, setup.quadrature_degree, [&](const auto& element, auto points) {
+    const Material& material = materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
     for (const auto& [F, X, fraction] : points) {
@@ -172,7 +173,7 @@ void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<D
   for (ForceCurvePoint& curve : asked.curves) add_cavity(setup, cells, state, curve);
   asked.points = points_of(setup, state, errors);
   if (options.von_mises || options.stress) {
-    CellStress stress = stress_of<Dim>(cells, data.x, state.quadrature, setup);
+    CellStress stress = stress_of<Dim>(cells, data.x, state, setup);
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
     if (options.stress) asked.stress = std::move(stress.cauchy);
   }
@@ -193,7 +194,7 @@ template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation) {
   const State<Dim>& state = simulation.state();
   const VectorX x = state.history.x[0].head(Dim * state.mesh.num_nodes());
-  return stress_of<Dim>(whole_mesh(state.mesh, {}), x, state.quadrature, simulation.setup());
+  return stress_of<Dim>(whole_mesh(state.mesh, {}), x, state, simulation.setup());
 }
 
 template CellStress cell_stress(const Simulation<2>&);
@@ -207,8 +208,9 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
   const CellSet<Dim> cells = whole_mesh(state.mesh, {});
+  const std::map<int, Material> materials = materials_at(setup, state.t);
   const auto add_density = [&](const auto& element, auto points) {
-    const Material& material = setup.materials.at(element.body);
+    const Material& material = materials.at(element.body);
     double mean = 0;
     for (const auto& [F, X, fraction] : points) mean += fraction * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
     if (element.curved)

@@ -17,6 +17,7 @@
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
 #include "energy/least_motion.hpp"
+#include "energy/polyfem/lagged_regularization.hpp"
 #include "fem/hessian_sink.hpp"
 #include "flight_guard.hpp"
 #include "held_turn.hpp"
@@ -74,6 +75,7 @@ class LaggedSolve {
       }
     }
     problem_.rounds_ = 0;
+    regularized_about_ = lagged_x;
     loose_force_ = asked_of_round(1);
     NewtonSummary summary = minimize_first(x, std::move(step_to_start));
     problem_.rounds_ = 1;
@@ -91,6 +93,7 @@ class LaggedSolve {
     std::optional<Lagged> now;  // what is lagged at x, where the last round made it
     Relaxation relaxation;
     const auto solve_again = [&] {
+      regularized_about_ = x;
       NewtonSummary next = minimize_lagged(x);
       ++problem_.rounds_;
       const bool is_fixed_point = next.converged() && next.iterations == 0 && loose_force_ == 0;
@@ -113,7 +116,7 @@ class LaggedSolve {
             factor = relaxation.factor(residual_of_lagging(x, next_lagged));
         } else {
           residual = residual_of(x, next_lagged);
-          is_settled = potential_.has_friction() && residual <= tolerance;
+          is_settled = (potential_.has_friction() || lagged_.adhesive_friction) && residual <= tolerance;
         }
       }
       if (is_settled) {
@@ -276,6 +279,9 @@ class LaggedSolve {
     VectorX d = problem_.increment_of(x);
     const VectorX target = held_.target - base_;
     EnergySum all = sum;
+    if (const LaggedRegularization& options = setup_.lagged_regularization;
+        setup_.time.is_static && options.weight > 0 && problem_.rounds_ < options.rounds)
+      all.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(regularized_about_, options.weight));
     if (least_motion_) {
       all.add(least_motion_);
       follow_least_motion(sum, d);
@@ -377,6 +383,12 @@ class LaggedSolve {
     int rounds = 1;
     if (potential_.has_friction())
       rounds = setup_.contact.friction_iterations < 0 ? kMostRounds : setup_.contact.friction_iterations;
+    if (lagged_.adhesive_friction) {
+      const int asked = setup_.contact.adhesion.iterations;
+      rounds = std::max(rounds, asked < 0 ? kMostRounds : asked);
+    }
+    if (setup_.time.is_static && setup_.lagged_regularization.weight > 0)
+      rounds = std::max(rounds, setup_.lagged_regularization.rounds);
     if (!lagged_.damping.empty() || !lagged_.contact_damping.empty())
       for (const DampingOptions& options : setup_.damping)
         rounds = std::max(rounds, setup_.lagging_tolerance > 0 ? kMostRounds : options.lagging_rounds);
@@ -486,6 +498,7 @@ class LaggedSolve {
   const std::unique_ptr<AdaptiveStiffness<Dim>>& adaptive_ = problem_.adaptive_;
   BarrierStiffness& stiffness_ = problem_.stiffness_;
   Lagged& lagged_ = problem_.lagged_;
+  VectorX regularized_about_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
 };
 

@@ -116,9 +116,19 @@ double rest_diagonal(const Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
+std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t) {
+  std::map<int, Material> materials = setup.materials;
+  for (auto& [body, material] : materials)
+    if (material.own_at) material.own = material.own_at(t);
+  return materials;
+}
+
+template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t) {
   const TimeIntegrator integrator(setup.time);
-  return {.materials = setup.materials,
+  std::vector<TermFactory<Dim>> host = setup.terms;
+  host.insert(host.end(), setup.nodal_loads.begin(), setup.nodal_loads.end());
+  return {.materials = materials_at(setup, t),
           .loads = loads_at(setup, t),
           .has_inertia = setup.time.has_inertia(),
           .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
@@ -127,13 +137,14 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .contact = setup.contact,
           .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
           .velocity_rate = integrator.velocity_rate(history),
-          .host = setup.terms,
+          .host = std::move(host),
           .t = t,
           .follower = {}};
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                        \
   template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                 \
+  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                \
   template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double); \
   template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                      \
   template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                   \

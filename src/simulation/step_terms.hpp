@@ -16,6 +16,10 @@ namespace itr {
 template <int Dim>
 Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 
+/// Materials of a setup at time t.
+template <int Dim>
+std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t);
+
 /// Terms that act in the step that ends at time t, as every scope of it sees them.
 template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);

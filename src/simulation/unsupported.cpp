@@ -39,6 +39,8 @@ constexpr Check<Dim> kChecks[] = {
      }},
     {{"terms", "terms of a program's own on quadratic elements"},
      [](const Setup<Dim>& setup, bool curves) { return (!setup.terms.empty() || setup.follower.forces) && curves; }},
+    {{"/contact/adhesion", "adhesion where the bodies' mesh changes"},
+     [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.contact.has_adhesion(); }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),

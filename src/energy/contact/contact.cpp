@@ -247,25 +247,37 @@ double walk(const CollisionSurface& surface, ConstVectorView x, ConstVectorView 
 
 template <int Dim>
 ContactEnergy<Dim>::ContactEnergy(const CollisionSurface& surface, const ContactOptions& options, double stiffness,
-                                  double scale) {
-  renew(surface, options, stiffness, scale);
+                                  double scale, ContactLaw law) {
+  renew(surface, options, stiffness, scale, law);
 }
 
 template <int Dim>
 void ContactEnergy<Dim>::renew(const CollisionSurface& surface, const ContactOptions& options, double stiffness,
-                               double scale) {
+                               double scale, ContactLaw law) {
   surface_ = &surface;
-  dhat_ = options.dhat;
+  law_ = law;
+  dhat_ = law == ContactLaw::barrier ? options.dhat : options.adhesion.reach;
   passing_ratio_ = options.adaptive_stiffness ? 1 : CcdOptions{}.passing_ratio;
-  convergent_ = options.convergent;
+  convergent_ = options.convergent && law == ContactLaw::barrier;
   stiffness_ = stiffness;
   scale_ = scale;
+  const AdhesionOptions& adhesion = options.adhesion;
+  peak_ = adhesion.peak * adhesion.peak;
+  slope_ = adhesion.strength / (4 * adhesion.peak * (peak_ - adhesion.reach * adhesion.reach));
+}
+
+/// 2 a (p - r) with a, p and r the slope, the squared peak and the squared reach.
+template <int Dim>
+double ContactEnergy<Dim>::largest_pull() const {
+  return 2 * slope_ * (peak_ - dhat_ * dhat_);
 }
 
 template <int Dim>
 double ContactEnergy<Dim>::barrier(double D) const {
   const double Dhat = dhat_ * dhat_;
   if (D >= Dhat) return 0;
+  if (law_ == ContactLaw::adhesion)
+    return D < peak_ ? slope_ * ((Dhat - peak_) * Dhat - (Dhat / peak_ - 1) * D * D) : slope_ * (D - Dhat) * (D - Dhat);
   if (!(D > 0)) return kInfinity;
   return -(D - Dhat) * (D - Dhat) * std::log(D / Dhat);
 }
@@ -273,12 +285,14 @@ double ContactEnergy<Dim>::barrier(double D) const {
 template <int Dim>
 double ContactEnergy<Dim>::barrier_first(double D) const {
   const double Dhat = dhat_ * dhat_;
+  if (law_ == ContactLaw::adhesion) return D >= Dhat ? 0 : 2 * slope_ * (D < peak_ ? (1 - Dhat / peak_) * D : D - Dhat);
   return D >= Dhat ? 0 : (Dhat - D) * (2 * std::log(D / Dhat) - Dhat / D + 1);
 }
 
 template <int Dim>
 double ContactEnergy<Dim>::barrier_second(double D) const {
   const double Dhat = dhat_ * dhat_, r = Dhat / D;
+  if (law_ == ContactLaw::adhesion) return D >= Dhat ? 0 : 2 * slope_ * (D < peak_ ? 1 - Dhat / peak_ : 1);
   return D >= Dhat ? 0 : (r + 2) * r - 2 * std::log(D / Dhat) - 3;
 }
 
@@ -336,7 +350,7 @@ template <int Dim>
 double ContactEnergy<Dim>::pair_energy(const ContactStencil& s, ConstVectorView x) const {
   double b = barrier(distance(s, x).squared);
   if constexpr (Dim == 3) {
-    if (s.is_mollified() && b > 0 && std::isfinite(b))
+    if (s.is_mollified() && b != 0 && std::isfinite(b))
       b *= Mollifier(edge_cross_squared(gather<3>(s.vertices, 4, x).data()), s.mollifier_threshold).value;
   }
   return stiffness_ * s.weight * b;

@@ -14,46 +14,19 @@ namespace itr {
 
 namespace {
 
-constexpr double kFall = 2;  ///< by eps_v: over which speeds above eps_v static friction falls to kinetic
-
-/// The place of a slip speed y on the fall from static to kinetic friction: 0 before it, 1 behind it.
-double on_fall(double y, double eps) { return std::min(1.0, (y - eps) / (kFall * eps)); }
-
-/// Friction by slip speed, of a pair whose kinetic friction is `kinetic` times the static: its potential, it by y, and its
-/// derivative. It is f1 below eps and goes from 1 to `kinetic` by a cubic function above.
-double f0(double y, double eps, double kinetic) {
-  if (y < eps) return y * y * (1 - y / (3 * eps)) / eps + eps / 3;
-  if (kinetic == 1) return y;
-  const double t = on_fall(y, eps), width = kFall * eps;
-  return y - (1 - kinetic) * (width * t * t * t * (1 - t / 2) + std::max(0.0, y - eps - width));
-}
-double f1_over_y(double y, double eps, double kinetic) {
-  if (y < eps) return (2 - y / eps) / eps;
-  if (kinetic == 1) return 1 / y;
-  const double t = on_fall(y, eps);
-  return (1 - (1 - kinetic) * t * t * (3 - 2 * t)) / y;
-}
-double f2(double y, double eps, double kinetic) {
-  if (y < eps) return 2 * (1 - y / eps) / eps;
-  if (kinetic == 1) return 0;
-  const double t = on_fall(y, eps);
-  return -(1 - kinetic) * 6 * t * (1 - t) / (kFall * eps);
-}
-
 /// Derivative by the slip velocity v of w(v), where y / f1(y) w = v for y = |v|, linearised at any w (Chan, Golub & Mulet
 /// 1999); of f1(y) v / y where w is that. Symmetrised; its eigenvalues are >= 0 for |w| <= 1: what the fall from static to
 /// kinetic friction would make of them is left out.
 template <int N>
-Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, double eps, double kinetic) {
-  const double y = v.norm(), isotropic = f1_over_y(y, eps, kinetic);
+Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, const SlipLaw& law) {
+  const double y = v.norm(), isotropic = law.by_speed(y);
   Mat<N> inner = Mat<N>::Identity();
   if (y > 0) {
     double slope = 1;  // of y / f1(y)
-    if (y < eps)
-      slope = 1 / (eps * eps * isotropic * isotropic);
-    else if (kinetic < 1)
-      slope =
-          std::min((isotropic - f2(y, eps, kinetic)) / (isotropic * isotropic * y), 1 / std::max(w.norm(), isotropic * y));
+    if (y < law.eps)
+      slope = 1 / (law.eps * law.eps * isotropic * isotropic);
+    else if (law.kinetic < 1)
+      slope = std::min((isotropic - law.derivative(y)) / (isotropic * isotropic * y), 1 / std::max(w.norm(), isotropic * y));
     const Mat<N> turn = slope / (2 * y) * w * v.transpose();
     inner -= turn + turn.transpose();
   }
@@ -98,6 +71,28 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Vec<3>& normal) {
 
 }  // namespace
 
+double SlipLaw::on_fall(double y) const { return std::min(1.0, (y - eps) / ((kSlides - 1) * eps)); }
+double SlipLaw::potential(double y) const {
+  if (lets_go && y >= 2 * eps) return 4 * eps / 3;
+  if (y < eps || lets_go) return y * y * (1 - y / (3 * eps)) / eps + (lets_go ? 0 : eps / 3);
+  if (kinetic == 1) return y;
+  const double t = on_fall(y), width = (kSlides - 1) * eps;
+  return y - (1 - kinetic) * (width * t * t * t * (1 - t / 2) + std::max(0.0, y - eps - width));
+}
+double SlipLaw::by_speed(double y) const {
+  if (y < (lets_go ? 2 * eps : eps)) return (2 - y / eps) / eps;
+  if (lets_go) return 0;
+  if (kinetic == 1) return 1 / y;
+  const double t = on_fall(y);
+  return (1 - (1 - kinetic) * t * t * (3 - 2 * t)) / y;
+}
+double SlipLaw::derivative(double y) const {
+  if (y < (lets_go ? 2 * eps : eps)) return 2 * (1 - y / eps) / eps;
+  if (lets_go || kinetic == 1) return 0;
+  const double t = on_fall(y);
+  return -(1 - kinetic) * 6 * t * (1 - t) / ((kSlides - 1) * eps);
+}
+
 template <int Dim>
 std::uint64_t friction_sides_of_node(const Mesh<Dim>& mesh, VertexId node, const std::vector<FrictionPair>& pairs) {
   std::uint64_t sides = 0;
@@ -136,13 +131,15 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
                                 double scale) {
   rate_ = velocity_rate;
   reference_ = velocity_reference;
-  epsv_ = options.friction_velocity;
+  epsv_ = contact.law() == ContactLaw::adhesion ? options.adhesion.velocity : options.friction_velocity;
   scale_ = scale;
   is_primal_dual_ = false;
+  lets_go_ = contact.law() == ContactLaw::adhesion;
   pairs_.clear();
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
-    const auto [statics, kinetic] = coefficients_of(s, options, contact.surface());
+    const double held = options.adhesion.tangential_coefficient;
+    const auto [statics, kinetic] = lets_go_ ? Coefficients{held, held} : coefficients_of(s, options, contact.surface());
     if (statics == 0) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
     const double distance = std::sqrt(q.squared);
@@ -152,7 +149,9 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0,
               .kinetic = kinetic / statics};
-    pair.force = statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
+    pair.force =
+        statics * s.weight *
+        (lets_go_ ? contact.largest_pull() : contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance);
     pairs_.push_back(pair);
   }
 }
@@ -171,7 +170,7 @@ auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) con
 template <int Dim>
 int FrictionEnergy<Dim>::count_let_go(ConstVectorView v, ConstVectorView x) const {
   return static_cast<int>(std::count_if(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
-    if (pair.kinetic == 1 || slip_velocity(pair, x).norm() < (1 + kFall) * epsv_) return false;
+    if (pair.kinetic == 1 || slip_velocity(pair, x).norm() < SlipLaw::kSlides * epsv_) return false;
     Vec<Dim> relative = Vec<Dim>::Zero();
     for (int k = 0; k < pair.size; ++k) relative += pair.coefficients[k] * v.segment<Dim>(Dim * pair.vertices[k]);
     return (pair.tangents.transpose() * relative).norm() < epsv_;
@@ -184,7 +183,7 @@ void FrictionEnergy<Dim>::begin_solve(ConstVectorView x, bool is_near) {
   for (Pair& pair : pairs_) {
     pair.slip = slip_velocity(pair, x);
     pair.ratio.setZero();
-    if (is_near) pair.ratio = f1_over_y(pair.slip.norm(), epsv_, pair.kinetic) * pair.slip;
+    if (is_near) pair.ratio = law_of(pair).by_speed(pair.slip.norm()) * pair.slip;
   }
 }
 
@@ -192,8 +191,8 @@ template <int Dim>
 void FrictionEnergy<Dim>::follow(ConstVectorView x, double fraction) {
   for (Pair& pair : pairs_) {
     const Vec<kTangents> slip = slip_velocity(pair, x);
-    const Mat<kTangents> derivative = linearised_ratio<kTangents>(pair.slip, pair.ratio, epsv_, pair.kinetic);
-    const Vec<kTangents> at_slip = f1_over_y(pair.slip.norm(), epsv_, pair.kinetic) * pair.slip;
+    const Mat<kTangents> derivative = linearised_ratio<kTangents>(pair.slip, pair.ratio, law_of(pair));
+    const Vec<kTangents> at_slip = law_of(pair).by_speed(pair.slip.norm()) * pair.slip;
     pair.ratio += fraction * (at_slip - pair.ratio) + derivative * (slip - pair.slip);
     pair.ratio /= std::max(1.0, pair.ratio.norm());
     pair.slip = slip;
@@ -230,7 +229,7 @@ void FrictionEnergy<Dim>::relax(const FrictionEnergy& before, double factor) {
 template <int Dim>
 double FrictionEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = 0;
-  for (const auto& pair : pairs_) sum += pair.force * f0(slip_velocity(pair, x).norm(), epsv_, pair.kinetic);
+  for (const auto& pair : pairs_) sum += pair.force * law_of(pair).potential(slip_velocity(pair, x).norm());
   return scale_ / rate_ * sum;
 }
 
@@ -238,7 +237,7 @@ template <int Dim>
 void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const Vec<Dim> force = scale_ * pair.force * f1_over_y(v.norm(), epsv_, pair.kinetic) * (pair.tangents * v);
+    const Vec<Dim> force = scale_ * pair.force * law_of(pair).by_speed(v.norm()) * (pair.tangents * v);
     for (int k = 0; k < pair.size; ++k) gradient.segment<Dim>(Dim * pair.vertices[k]) += pair.coefficients[k] * force;
   }
 }
@@ -248,13 +247,14 @@ void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4 * Dim, 4 * Dim> block;
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
-    const double y = v.norm(), isotropic = f1_over_y(y, epsv_, pair.kinetic);
-    // Along v the second derivative is f2, across it f1 / y >= 0.
+    const SlipLaw law = law_of(pair);
+    const double y = v.norm(), isotropic = law.by_speed(y);
+    // Along v the second derivative is that of the law, across it f1 / y >= 0.
     Mat<kTangents> inner = isotropic * Mat<kTangents>::Identity();
     if (is_primal_dual_)
-      inner = linearised_ratio<kTangents>(v, pair.ratio, epsv_, pair.kinetic);
+      inner = linearised_ratio<kTangents>(v, pair.ratio, law);
     else if (y > 0)
-      inner += (projected(f2(y, epsv_, pair.kinetic), psd) - isotropic) / (y * y) * v * v.transpose();
+      inner += (projected(law.derivative(y), psd) - isotropic) / (y * y) * v * v.transpose();
     const double force = projected(pair.force, psd);
     if (force == 0) continue;
     const Mat<Dim> world = scale_ * rate_ * force * pair.tangents * inner * pair.tangents.transpose();

@@ -13,8 +13,23 @@ template <int Dim>
 std::uint64_t friction_sides_of_node(const Mesh<Dim>& mesh, VertexId node, const std::vector<FrictionPair>& pairs);
 std::uint64_t friction_sides_of_obstacle(int vertex, const std::vector<FrictionPair>& pairs);
 
+/// Friction by slip speed y, of the most that a pair resists. Smoothed below eps, where f1 is a quadratic polynomial; from
+/// there on it goes from 1 to `kinetic` by a cubic one. That of adhesion lets go: its polynomial goes on to 0 at 2 eps.
+struct SlipLaw {
+  static constexpr double kSlides = 3;  ///< by eps: the speed from which on friction is kinetic
+  double eps, kinetic;
+  bool lets_go;
+  double potential(double y) const;   ///< f0
+  double by_speed(double y) const;    ///< f1 by y
+  double derivative(double y) const;  ///< of f1
+
+ private:
+  double on_fall(double y) const;
+};
+
 /// Smoothed Coulomb friction with normal forces, tangents and closest points lagged at the positions where it was made
-/// (docs/theory.md, "Friction").
+/// (docs/theory.md, "Friction"). Of a contact energy of ContactLaw::adhesion: what holds against sliding, of its largest
+/// pull.
 template <int Dim>
 class FrictionEnergy final : public Energy {
  public:
@@ -55,12 +70,14 @@ class FrictionEnergy final : public Energy {
     Vec<kTangents> slip = Vec<kTangents>::Zero(), ratio = Vec<kTangents>::Zero();
   };
   Vec<kTangents> slip_velocity(const Pair& pair, ConstVectorView x) const;
+  SlipLaw law_of(const Pair& pair) const { return {epsv_, pair.kinetic, lets_go_}; }
 
   std::vector<Pair> pairs_;
   double rate_ = 1;  ///< and the reference of VelocityRule
   ScratchVector reference_;
   double epsv_ = 0;
   bool is_primal_dual_ = false;
+  bool lets_go_ = false;  ///< of adhesion
   double scale_ = 1;
 };
 

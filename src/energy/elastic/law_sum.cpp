@@ -114,7 +114,12 @@ void visit_fibres(const LawSum& sum, const Vec<3>& X, const Strain<Dim>& strain,
   for (const LawSum::Term& term : sum.terms) {
     if (!term.row->fibre) continue;
     const FibreStretch<Dim> stretch(sum, term, term.direction(X), strain);
-    visit(stretch, term.row->fibre(term.values, stretch.value()));
+    FibreResponse w = term.row->fibre(term.values, stretch.value());
+    if (term.share) {
+      const double share = term.share(X, sum.time);
+      w = {share * w.value, share * w.first, share * w.second};
+    }
+    visit(stretch, w);
   }
 }
 

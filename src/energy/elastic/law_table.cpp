@@ -113,6 +113,17 @@ void add_incompressible_ogden(const LawValues& v, StretchResponse& at) {
   add_log_bulk(v[2][0], at);
 }
 
+/// 100 mu (1 / (1 + (J / J0 - 1)^3) - 1) below J0, 0 above it.
+void add_inversion_barrier(const LawValues& v, StretchResponse& at) {
+  constexpr double kSize = 100;
+  const double J = std::exp(at.log_J()), limit = v[2][0], t = J / limit - 1;
+  if (t >= 0) return;
+  const double q = 1 + t * t * t, factor = kSize * v[1][0];
+  const double first = -factor * 3 * t * t / (limit * q * q);
+  const double second = factor * (18 * t * t * t * t - 6 * t * q) / (limit * limit * q * q * q);
+  at.add_volume(-factor * t * t * t / q, first * J, (second * J + first) * J);
+}
+
 /// k1 / (2 k2) (exp(k2 x^2) - 1) of stretched fibres.
 FibreResponse hgo_fibre(const LawValues& v, double x) {
   if (x <= 0) return {0, 0, 0};
@@ -145,6 +156,12 @@ const std::vector<LawRow>& rows() {
        nullptr,
        true},
       {"VolumePenalty", {{"k", Range::positive}}, [](const LawValues& v, StretchResponse& at) { add_bulk(v[0][0], at); }},
+      {"InversionBarrier",
+       {{"lambda", Range::any}, {"mu", Range::positive}, {"JBarrierThreshold", Range::positive, false, 0.5}},
+       add_inversion_barrier,
+       nullptr,
+       true,
+       true},
       {"AMIPS",
        {{"weight", Range::positive, false, 1}},
        [](const LawValues& v, StretchResponse& at) { at.add(v[0][0], at.isochoric_powers(2)); }},

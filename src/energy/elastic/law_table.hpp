@@ -3,6 +3,7 @@
 // scenes call them, and its energy density. A scene's reader, derivatives and tests are made of the rows.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <span>
@@ -40,7 +41,7 @@ struct LawRow {
   std::vector<LawCoefficient> coefficients;
   void (*add)(const LawValues& values, StretchResponse& response) = nullptr;
   FibreResponse (*fibre)(const LawValues& values, double x) = nullptr;
-  bool has_lame = false;      ///< its two coefficients are lambda and mu, which E and nu may stand for
+  bool has_lame = false;      ///< its first two coefficients are lambda and mu, which E and nu may stand for
   bool only_in_sums = false;  ///< alone another implementation stands for its type
   int dispersion = -1;        ///< of a fibre: which coefficient is kappa of M = kappa I + (1 - d kappa) a a^T; -1: 0
 };
@@ -53,10 +54,13 @@ class LawSum final : public OwnLaw {
     const LawRow* row;
     LawValues values;
     std::function<Vec<3>(const Vec<3>& X)> direction{};  ///< of a fibre at rest position X, of length 1
+    /// Which share of a fibre's energy acts at X and the time t [s], of [0, 1]; empty: all of it.
+    std::function<double(const Vec<3>& X, double t)> share{};
   };
   std::vector<Term> terms;  ///< isotropic ones first
   int dimension = 3;        ///< d of all invariants; 2: PolyFEM's in 2D
   bool is_plane_stress = false;
+  double time = 0;  ///< of shares [s]
 
   std::string name() const;
 
@@ -77,5 +81,18 @@ RestModuli rest_moduli(const LawSum& sum);
 
 /// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
 Material material_of(const LawSum& sum, int dim);
+
+/// A material of W = e : C e / 2 with the small strain e, or with Green's strain. `stiffness` is C in Voigt's form [Pa],
+/// positive definite: 11, 22, 33, 23, 13, 12 (2D: 11, 22, 12), shears twice those of the tensor. E and nu are those of its
+/// mean over all directions.
+Material tensor_material(const MatrixX& stiffness, bool is_small_strain);
+/// The stiffness of the same material turned by a rotation R, which maps its axes to those of space.
+MatrixX turned(const MatrixX& stiffness, const MatrixX& R);
+
+/// The body force by volume [N/m^Dim] that holds a material at X in a field of displacements u: -div P, by its gradient and
+/// second[i], the derivatives of row i of that.
+template <int Dim>
+Vec<Dim> holding_force(const Material& material, const Vec<Dim>& X, const Mat<Dim>& gradient,
+                       const std::array<Mat<Dim>, Dim>& second);
 
 }  // namespace itr
