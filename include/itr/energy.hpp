@@ -21,6 +21,8 @@
 namespace itr {
 
 struct BlockingPairs;
+template <int Dim>
+struct VolumePatches;
 
 /// Cells with a vertex numbering of their own: the whole mesh, or the patch around an edit. Every energy term is built from
 /// one, so global and local problems share all their code.
@@ -52,6 +54,7 @@ struct CellSet {
   std::vector<Vec<Dim>> rest;     ///< per local vertex
   std::vector<Element> elements;  ///< those without curved edges first
   std::vector<BoundaryFacet> facets;
+  std::shared_ptr<const VolumePatches<Dim>> patches{};  ///< null: all volumetric energies are taken at each point
 
   /// The elements without curved edges, and those with at least one.
   std::span<const Element> straight() const { return {elements.data(), num_straight()}; }

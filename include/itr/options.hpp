@@ -21,6 +21,10 @@ namespace itr {
 /// Stored-energy densities; their formulas are in energy/elastic/laws.hpp.
 enum class MaterialLaw { neo_hookean, linear, saint_venant_kirchhoff, fixed_corotated, mooney_rivlin, own };
 
+/// Where the volumetric part U(det F) of a law is taken: at each point, or of the mean det F over patches of cells, which
+/// keeps nearly incompressible bodies from locking.
+enum class VolumeForm { pointwise, patches };
+
 /// A scalar function of rest position X [m]; in 2D X_3 = 0. Empty: none.
 using SpaceFunction = std::function<double(const Vec<3>& X)>;
 
@@ -55,6 +59,7 @@ struct Material {
   MooneyRivlinModuli mooney_rivlin{};
   std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
   std::function<std::shared_ptr<const OwnLaw>(double t)> own_at{};  ///< that at time t [s] instead; empty: `own` always
+  VolumeForm volume = VolumeForm::pointwise;
 
   /// Functions that replace the constants above, sampled at the rest barycentre of each element. Empty: the constant.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};

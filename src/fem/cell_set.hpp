@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fem/quadratic.hpp"
+#include "fem/volume_patches.hpp"
 #include "itr/energy.hpp"
 
 namespace itr {
@@ -41,7 +42,7 @@ struct Stencils {
   bool operator==(const Stencils&) const = default;
 };
 
-/// Kinds of elements, in their order in a CellSet.
+/// Kinds of elements, in their order in a CellSet. Pairs of nodes of one volume patch follow them.
 enum ElementKind : int { kStraight, kCurved };
 template <int Dim>
 std::vector<Stencils> element_stencils(const CellSet<Dim>& cells) {
@@ -56,6 +57,13 @@ std::vector<Stencils> element_stencils(const CellSet<Dim>& cells) {
   fill(stencils[kStraight].vertices, cells.straight(), Dim + 1, [](const auto& element) { return element.vertices; });
   fill(stencils[kCurved].vertices, cells.curved(), kQuadraticNodes<Dim>,
        [](const auto& element) { return element.nodes(); });
+  if (!cells.patches) return stencils;
+  Stencils& pairs = stencils.emplace_back(Stencils{{}, 2});
+  for (std::size_t patch = 0; patch < cells.patches->count(); ++patch) {
+    const std::span<const int> nodes = cells.patches->nodes_of(patch);
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) pairs.vertices.insert(pairs.vertices.end(), {nodes[j], nodes[i]});
+  }
   return stencils;
 }
 

@@ -85,6 +85,8 @@ static const std::string& asked_set(const Node& root) {
 
 bool is_polyfem_set(const Node& root) { return asked_set(root).starts_with("polyfem"); }
 
+bool averages_volume(const Node& root) { return !is_polyfem_set(root) && asked_set(root) != kOf01; }
+
 ChosenDefaults apply_defaults(Document& document) {
   ChosenDefaults chosen;
   const Node root(document);

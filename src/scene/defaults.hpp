@@ -26,6 +26,8 @@ const std::vector<std::string>& names_of_sets();
 
 /// Whether a scene chooses PolyFEM's set.
 bool is_polyfem_set(const Node& root);
+/// Whether nearly incompressible bodies average their volume over patches where a material does not say.
+bool averages_volume(const Node& root);
 
 /// Puts the set that a checked scene chooses into it, and tells which one and what.
 ChosenDefaults apply_defaults(Document& document);

@@ -258,9 +258,10 @@ class SumReader {
 
 class MaterialReader {
  public:
-  /// `is_polyfem`: as PolyFEM, which has invariants of two dimensions in 2D.
-  MaterialReader(const Node& node, int dimension, bool is_polyfem)
-      : node_(node), dimension_(dimension), shear_factor_(is_polyfem ? 2 : 1) {
+  /// `is_polyfem`: as PolyFEM, which has invariants of two dimensions in 2D. `has_patches`: nearly incompressible bodies
+  /// average their volume.
+  MaterialReader(const Node& node, int dimension, bool is_polyfem, bool has_patches)
+      : node_(node), dimension_(dimension), shear_factor_(is_polyfem ? 2 : 1), has_patches_(has_patches) {
     const LawName& law = read_law(node, false);
     material_.law = law.law;
     if (law.law == MaterialLaw::mooney_rivlin)
@@ -309,12 +310,24 @@ class MaterialReader {
     material.youngs_modulus = largest(material.youngs_modulus_at, material.youngs_modulus);
     material.poisson_ratio = largest(material.poisson_ratio_at, material.poisson_ratio);
     material.density = largest(material.density_at, material.density);
+    material.volume = read_volume(material);
     return material;
   }
 
  private:
   void require(const char* key, ScalarValue value, bool (*is_met)(double), const char* expected) {
     requirements_.push_back(requirement_of(node_[key], std::move(value), is_met, expected));
+  }
+
+  VolumeForm read_volume(const Material& material) const {
+    static const std::vector<std::string> forms = {"pointwise", "patches"};
+    const Node volume = node_["volume"];
+    const bool by_default = has_patches_ && is_nearly_incompressible(material, dimension_);
+    const auto form = static_cast<VolumeForm>(volume.choice(forms, by_default ? 1 : 0));
+    if (form == VolumeForm::patches && !may_average_volume(material, dimension_))
+      volume.fail("\"patches\" for a law without a part U(det F), with moduli that vary, or in plane stress",
+                  "\"pointwise\" there");
+    return form;
   }
 
   ScalarValue read_required(const char* key) const {
@@ -507,6 +520,7 @@ class MaterialReader {
   Node node_;
   int dimension_;
   double shear_factor_;
+  bool has_patches_;
   Material material_;
   std::vector<Requirement> requirements_;
   std::optional<ScalarValue> lambda_, mu_;  ///< instead of E and nu
@@ -568,15 +582,16 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
     if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
       warnings.push_back(entry["rho"].pointer() + ": not given, so it is 1 kg/m^3");
   const bool is_polyfem = is_polyfem_set(root);
+  const bool has_patches = averages_volume(root) && !root["space"]["remesh"]["enabled"].boolean(false);
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
-    MaterialReader reader(node, Dim, is_polyfem);
+    MaterialReader reader(node, Dim, is_polyfem, has_patches);
     for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
   std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
-    MaterialReader reader(entry, Dim, is_polyfem);
+    MaterialReader reader(entry, Dim, is_polyfem, has_patches);
     for (const auto& [label, id] : ids_of(entry, bodies, points)) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);

@@ -146,10 +146,11 @@ struct Response {
   double gain = 0;
 };
 /// Minimises the model of this gradient and Hessian by conjugate gradients. Gains up to `nothing` are left, and it ends
-/// where one is less than `enough` of those so far.
+/// where one is less than `enough` of those so far, of which the first `jump` count for nothing: it is what the model's
+/// energy rose by before.
 template <typename Precondition>
 End minimise(const DofMap& dofs, const NewtonSystem::Product& hessian, const Precondition& precondition,
-             const VectorX& gradient, double nothing, double enough, Response& response) {
+             const VectorX& gradient, double nothing, double enough, double jump, Response& response) {
   VectorX residual = -at_unknowns(dofs, gradient), motion = VectorX::Zero(residual.size());
   response = {at_dofs(dofs, motion)};
   VectorX z = precondition(residual), p = z, product(residual.size());
@@ -163,7 +164,7 @@ End minimise(const DofMap& dofs, const NewtonSystem::Product& hessian, const Pre
     motion += step * p;
     residual -= step * product;
     response.gain += gain;
-    if (gain < enough * response.gain) break;
+    if (gain < enough * std::abs(response.gain - jump)) break;
     z = precondition(residual);
     const double next = residual.dot(z);
     p = z + next / rz * p;
@@ -381,6 +382,8 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
     report.no_bar = "the solution is not possible in a finer space";
     return false;
   }
+  // Finer patches raise the energy of the same positions.
+  const double jump = fine.cells().patches ? start - problem.sum().value(x, problem.workspace()) : 0;
   Response response;
   const auto solve = [&] {
     End end = End::indefinite;
@@ -396,7 +399,8 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
             motion.template segment<Dim>(Dim * node) += blocks[node] * all.template segment<Dim>(Dim * node);
         return at_unknowns(fine.dofs(), motion);
       };
-      end = minimise(fine.dofs(), system.product(), by_levels, change.all, kNothing * std::abs(start), kEnough, response);
+      end = minimise(fine.dofs(), system.product(), by_levels, change.all, kNothing * std::abs(start), kEnough, jump,
+                     response);
       if (end != End::indefinite) break;
     }
     return end;
@@ -436,7 +440,7 @@ bool ErrorEstimator<Dim>::estimate_others(const StepSetup<Dim>& setup, const Sta
     Response response{VectorX::Zero(x.size())};
     const auto solve = [&] {
       const auto by_factor = [&](const VectorX& residual) { return precondition(residual); };
-      return minimise(problem.dofs(), hessian, by_factor, change.all, nothing, kEnoughInContact, response);
+      return minimise(problem.dofs(), hessian, by_factor, change.all, nothing, kEnoughInContact, 0, response);
     };
     if (!change.all.isZero(0) && !try_factors(problem, x, report.no_bar, solve)) return false;
     // Where a source changes the energy itself, that is of first order, and the gain of second.

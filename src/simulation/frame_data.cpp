@@ -12,6 +12,7 @@
 #include "energy/cavity.hpp"
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/law_sum.hpp"
+#include "energy/elastic/patched_volume.hpp"
 #include "energy/inertia.hpp"
 #include "fem/locator.hpp"
 #include "simulation/contact_surface.hpp"
@@ -27,6 +28,7 @@ template <int Dim>
 struct CellPoint {
   Mat<Dim> F;
   Vec<Dim> X;
+  std::array<double, Dim + 1> weights;  ///< barycentric coordinates
   double fraction;
 };
 
@@ -38,17 +40,60 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
   std::vector<const typename CellSet<Dim>::Element*> ordered(cells.elements.size());
   for (const auto& element : cells.elements) ordered[element.cell] = &element;
   std::vector<CellPoint<Dim>> points;
+  std::array<double, Dim + 1> middle;
+  middle.fill(1.0 / (Dim + 1));
   for (std::size_t e = 0; const auto* element : ordered) {
     points.clear();
     if (element->curved)
       for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e++], degree))
         points.push_back({at_nodes<Dim>(element->nodes(), x) * shape_gradients<Dim>(*element, point.weights).transpose(),
-                          rest_position<Dim>(cells, *element, point.weights), point.fraction});
+                          rest_position<Dim>(cells, *element, point.weights), point.weights, point.fraction});
     else
-      points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), 1});
+      points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), middle, 1});
     f(*element, std::span<const CellPoint<Dim>>(points));
   }
 }
+
+/// The mesh as the elastic energy has it: with patches, and their pressures and densities at x.
+template <int Dim>
+struct FrameCells {
+  std::map<int, Material> materials;  ///< at the time of the state
+  CellSet<Dim> cells;
+  PatchPressures<Dim> pressures;
+  std::vector<double> densities;
+
+  FrameCells(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x)
+      : materials(materials_at(setup, state.t)), cells(whole_mesh(state.mesh, {})) {
+    add_patches(materials, cells);
+    if (!cells.patches) return;
+    const auto rule_of = [&](std::size_t e) -> const auto& {
+      return cell_quadrature<Dim>(state.quadrature.empty() ? 0 : state.quadrature[e], setup.quadrature_degree);
+    };
+    const PatchedVolume<Dim> volume(cells, materials, 1, rule_of);
+    const std::vector<double> changes = volume.changes({cells.rest, x});
+    pressures = volume.pressures(changes);
+    densities = volume.densities(changes);
+  }
+  std::size_t number(const typename CellSet<Dim>::Element& element) const {
+    return static_cast<std::size_t>(&element - cells.elements.data());
+  }
+  /// The law at a point of an element.
+  ElasticModuli moduli(const Material& material, const typename CellSet<Dim>::Element& element,
+                       const CellPoint<Dim>& point) const {
+    return pressures.in(cell_moduli<Dim>(cells, material, point.X), number(element), point.weights);
+  }
+  /// Mean energy density of the patches in an element.
+  double density(const typename CellSet<Dim>::Element& element) const {
+    double sum = 0;
+    std::array<double, Dim + 1> middle;  // where linear weights are their means
+    middle.fill(1.0 / (Dim + 1));
+    const auto e = static_cast<int>(number(element));
+    for (int part = 0; cells.patches && part < VolumePatches<Dim>::kParts; ++part)
+      if (const int patch = cells.patches->patch_of[e][part]; patch != kNone)
+        sum += cells.patches->weight(e, part, middle) * densities[patch];
+    return sum;
+  }
+};
 
 /// The first kinds of a ForceCurvePoint.
 template <std::size_t N, int Dim>
@@ -128,28 +173,27 @@ double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
 }
 
 template <int Dim>
-double out_of_plane_stress(const Material& material, const Mat<Dim>& F, const Vec<Dim>& X) {
+double out_of_plane_stress(const Material& material, const ElasticModuli& moduli, const Mat<Dim>& F) {
   if (Dim == 3 || !material.plane_strain || (sum_of(material) && sum_of(material)->dimension == 2)) return 0;
   Mat<3> in_space = Mat<3>::Identity();
   in_space.template topLeftCorner<Dim, Dim>() = F;
-  Vec<3> place = Vec<3>::Zero();
-  place.template head<Dim>() = X;
-  return elastic_stress<3>(in_space, elastic_moduli<3>(material, place))(2, 2) / F.determinant();
+  return elastic_stress<3>(in_space, moduli)(2, 2) / F.determinant();
 }
 
 template <int Dim>
-CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const State<Dim>& state, const Setup<Dim>& setup) {
+CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const QuadratureLevels& levels,
+                     const Setup<Dim>& setup) {
   CellStress stress;
-  const std::map<int, Material> materials = materials_at(setup, state.t);
-  for_each_cell_in_order<Dim>(cells, x, state.quadrature, setup.quadrature_degree, [&](const auto& element, auto points) {
-    const Material& material = materials.at(element.body);
+  for_each_cell_in_order<Dim>(frame.cells, x, levels, setup.quadrature_degree, [&](const auto& element, auto points) {
+    const Material& material = frame.materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
-    for (const auto& [F, X, fraction] : points) {
-      const ElasticModuli moduli = elastic_moduli<Dim>(material, X);
+    for (const auto& point : points) {
+      const ElasticModuli moduli = frame.moduli(material, element, point);
+      const Mat<Dim>& F = point.F;
       const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, material));
-      cauchy += fraction * here;
-      equivalent += fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, F, X));
+      cauchy += point.fraction * here;
+      equivalent += point.fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, moduli, F));
     }
     stress.von_mises.push_back(equivalent);
     for (int i = 0; i < Dim; ++i)
@@ -160,7 +204,7 @@ CellStress stress_of(const CellSet<Dim>& cells, const VectorX& x, const State<Di
 
 /// Adds the fields that the setup asks for.
 template <int Dim>
-void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, const ErrorFields& errors,
+void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const State<Dim>& state, const ErrorFields& errors,
                FrameData<Dim>& data) {
   const FieldOptions& options = setup.fields;
   AskedFields& asked = data.asked;
@@ -170,16 +214,16 @@ void add_asked(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<D
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
   for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
-  for (ForceCurvePoint& curve : asked.curves) add_cavity(setup, cells, state, curve);
+  for (ForceCurvePoint& curve : asked.curves) add_cavity(setup, frame.cells, state, curve);
   asked.points = points_of(setup, state, errors);
   if (options.von_mises || options.stress) {
-    CellStress stress = stress_of<Dim>(cells, data.x, state, setup);
+    CellStress stress = stress_of<Dim>(frame, data.x, state.quadrature, setup);
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
     if (options.stress) asked.stress = std::move(stress.cauchy);
   }
   if (!options.kinetic_energy && !options.momentum) return;
   VectorX product = VectorX::Zero(data.v.size());
-  InertiaEnergy<Dim>(cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
+  InertiaEnergy<Dim>(frame.cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
                      VectorX::Zero(data.v.size()))
       .add_mass_product(data.v, product);
   if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
@@ -194,7 +238,7 @@ template <int Dim>
 CellStress cell_stress(const Simulation<Dim>& simulation) {
   const State<Dim>& state = simulation.state();
   const VectorX x = state.history.x[0].head(Dim * state.mesh.num_nodes());
-  return stress_of<Dim>(whole_mesh(state.mesh, {}), x, state, simulation.setup());
+  return stress_of<Dim>({simulation.setup(), state, x}, x, state.quadrature, simulation.setup());
 }
 
 template CellStress cell_stress(const Simulation<2>&);
@@ -207,20 +251,21 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   FrameData<Dim> data;
   data.x = state.history.x[0].head(Dim * bodies);
   data.v = state.history.v[0].head(Dim * bodies);
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
-  const std::map<int, Material> materials = materials_at(setup, state.t);
+  const FrameCells<Dim> frame(setup, state, data.x);
+  const CellSet<Dim>& cells = frame.cells;
   const auto add_density = [&](const auto& element, auto points) {
-    const Material& material = materials.at(element.body);
-    double mean = 0;
-    for (const auto& [F, X, fraction] : points) mean += fraction * elastic_density<Dim>(F, elastic_moduli<Dim>(material, X));
+    const Material& material = frame.materials.at(element.body);
+    double mean = frame.density(element);
+    for (const auto& point : points)
+      mean += point.fraction * elastic_density<Dim>(point.F, cell_moduli<Dim>(cells, material, point.X));
     if (element.curved)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
-                                   elastic_moduli<Dim>(material, rest_barycenter<Dim>(cells, element)));
+                                   cell_moduli<Dim>(cells, material, rest_barycenter<Dim>(cells, element)));
     data.elastic_density.push_back(mean);
   };
   for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup.quadrature_degree, add_density);
   data.asked.forces = forces;
-  add_asked(setup, cells, state, errors, data);
+  add_asked(setup, frame, state, errors, data);
   const VectorX& all = state.history.x[0];
   for (Eigen::Index i = Dim * bodies; i < all.size(); i += Dim) data.obstacle_x.emplace_back(all.segment<Dim>(i));
   if (setup.proxy) {

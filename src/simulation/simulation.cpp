@@ -206,10 +206,8 @@ struct Simulation<Dim>::Impl {
   void complete_conditions() {
     const RemeshOptions& remesh = setup.remesh;
     if (!remesh.enabled) return;
-    if (setup.lump_mass) {
-      refuse_unsupported(setup);
-      refuse_unsupported(setup, *state);
-    }
+    refuse_unsupported(setup);
+    if (setup.lump_mass) refuse_unsupported(setup, *state);
     if (remeshing_is_complete && remesh.split.acceptance_tolerance) return;
     complete(setup, logger);
     remeshing_is_complete = true;

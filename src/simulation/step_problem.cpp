@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "diagnosis.hpp"
+#include "energy/elastic/patched_volume.hpp"
 #include "energy/follower.hpp"
 #include "energy/mapped.hpp"
 #include "fem/unknowns.hpp"
@@ -25,6 +26,7 @@ MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
       chords(chords),
       cells(whole_mesh(mesh, setup.obstacles.rest)),
       diagonal(rest_diagonal(mesh)) {
+  add_patches(setup.materials, cells);
   if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
 }
 

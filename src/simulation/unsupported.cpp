@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "energy/elastic/law_table.hpp"
 #include "itr/core.hpp"
 
 namespace itr {
@@ -41,6 +42,17 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool curves) { return (!setup.terms.empty() || setup.follower.forces) && curves; }},
     {{"/contact/adhesion", "adhesion where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.contact.has_adhesion(); }},
+    {{"/materials/*/volume", "\"patches\" where the mesh changes: a gain by fewer patches would not be one of the mesh"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),
+                                                  [](const auto& e) { return e.second.volume == VolumeForm::patches; });
+     }},
+    {{"/materials/*/volume", "\"patches\" for a law without a part U(det F), with moduli that vary, or in plane stress"},
+     [](const Setup<Dim>& setup, bool) {
+       return std::any_of(setup.materials.begin(), setup.materials.end(), [](const auto& e) {
+         return e.second.volume == VolumeForm::patches && !may_average_volume(e.second, Dim);
+       });
+     }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),

@@ -279,7 +279,7 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
     const char* help =
         "quadratic elements (/space/discr_order: 2), remeshing (/space/remesh/enabled) or a finer mesh (n_refs) help: "
         "compare";
-    const bool keeps_volume = Dim == 3 || material.plane_strain;
+    const bool keeps_volume = (Dim == 3 || material.plane_strain) && material.volume == VolumeForm::pointwise;
     const bool is_thin = size.thickness < kSlender * size.diagonal && layers < few_layers;
     if (setup.remesh.enabled) {
       if (is_thin)

@@ -12,6 +12,7 @@
 #include "advice.hpp"
 #include "core/connected_parts.hpp"
 #include "energy/elastic/law_table.hpp"
+#include "energy/elastic/patched_volume.hpp"
 #include "fem/quadrature.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
@@ -117,12 +118,13 @@ class Explanation {
       const Material& material = setup_.materials.at(id);
       const auto order = setup_.order.find(id);
       const std::string name = set_text(setup_.names.bodies, id);
-      fmt::print("  id {}{}: {} {} elements, {} {}, {}, E {}, nu {:.4g}, rho {:.4g} {}, mass {}\n", id,
+      fmt::print("  id {}{}: {} {} elements, {} {}, {}, E {}, nu {:.4g}{}, rho {:.4g} {}, mass {}\n", id,
                  name == std::to_string(id) ? "" : " (" + name + ")", sum.cells,
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
                  units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"),
                  sum_of(material) ? sum_of(material)->name() : kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
+                 material.volume == VolumeForm::patches ? " (volume averaged over patches)" : "",
                  units.from_si(material.density, "kg/m^3"), units.name("kg/m^3"),
                  units.text(material.density * sum.volume, "kg"));
     }
@@ -173,7 +175,7 @@ class Explanation {
          setup_.remesh.enabled ? "/space/remesh/enabled" : "/space/remesh/enabled is false");
   }
 
-  /// Pairs of nodes that share a cell.
+  /// Pairs of nodes that share a cell or a patch.
   static std::set<std::array<int, 2>> coupled_nodes(const CellSet<Dim>& cells) {
     std::set<std::array<int, 2>> pairs;
     for (const auto& element : cells.elements)
@@ -182,6 +184,10 @@ class Explanation {
           if (a < b) pairs.insert({a, b});
         });
       });
+    for (std::size_t i = 0; cells.patches && i < cells.patches->count(); ++i)
+      for (const int a : cells.patches->nodes_of(i))
+        for (const int b : cells.patches->nodes_of(i))
+          if (a < b) pairs.insert({a, b});
     return pairs;
   }
 
@@ -201,7 +207,9 @@ class Explanation {
       matrix.order += free(v);
       matrix.nonzeros += free(v) * (free(v) + 1) / 2;
     }
-    for (const auto& [a, b] : coupled_nodes(whole_mesh(mesh, {}))) matrix.nonzeros += free(a) * free(b);
+    CellSet<Dim> cells = whole_mesh(mesh, {});
+    add_patches(setup_.materials, cells);
+    for (const auto& [a, b] : coupled_nodes(cells)) matrix.nonzeros += free(a) * free(b);
     constexpr double kEntryBytes = 12, kMegabyte = 1e6;
     fmt::print("unknowns\n  {} of {} ({} held); matrix {:.1f} MB, factor of a direct solver up to about {:.1f} MB{}\n",
                matrix.order, bodies, bodies - matrix.order, kEntryBytes * static_cast<double>(matrix.nonzeros) / kMegabyte,

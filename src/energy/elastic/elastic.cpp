@@ -10,6 +10,7 @@
 #include "energy/round_off.hpp"
 #include "fem/displacement.hpp"
 #include "geometry/measures.hpp"
+#include "patched_volume.hpp"
 #include "point.hpp"
 #include "quadratic.hpp"
 
@@ -143,17 +144,21 @@ void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double 
   scale_ = scale;
   curved_.reset();
   if (cells_.has_curved()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
+  patched_.reset();
+  if (cells_.patches)
+    patched_ = std::make_unique<PatchedVolume<Dim>>(
+        cells_, materials, scale, [this](std::size_t e) -> const auto& { return curved_->rule(e); });
   by_body_.clear();
   by_element_.clear();
   bool varies = false;
   for (const auto& [body, material] : materials) {
     varies = varies || material.has_varying_moduli();
-    if (!material.has_varying_moduli()) by_body_.emplace_back(body, elastic_moduli<Dim>(material, Vec<Dim>::Zero()));
+    if (!material.has_varying_moduli()) by_body_.emplace_back(body, cell_moduli<Dim>(cells_, material, Vec<Dim>::Zero()));
   }
   if (!varies) return;
   by_element_.reserve(cells_.straight().size());
   for (const auto& element : cells_.straight())
-    by_element_.push_back(elastic_moduli<Dim>(materials.at(element.body), rest_barycenter(cells_, element)));
+    by_element_.push_back(cell_moduli<Dim>(cells_, materials.at(element.body), rest_barycenter(cells_, element)));
 }
 
 template <int Dim>
@@ -182,26 +187,35 @@ double ElasticEnergy<Dim>::value_of(const Displacement<Dim>& u, ConstVectorView 
     const auto& element = cells_.elements[e];
     return element.volume * elastic_density<Dim>(displacement_gradient<Dim>(element, u), moduli(e));
   });
-  return curved_ ? straight + curved_->value(u, x) : straight;
+  const double cells = curved_ ? straight + curved_->value(u, x) : straight;
+  return patched_ && std::isfinite(cells) ? cells + patched_->value(patched_->changes(u)) : cells;
+}
+
+template <int Dim>
+PatchPressures<Dim> ElasticEnergy<Dim>::pressures(const Displacement<Dim>& u) const {
+  return patched_ ? patched_->pressures(patched_->changes(u)) : PatchPressures<Dim>{};
 }
 
 /// Stress and displacement gradient both round: W by epsilon of itself, and by epsilon |P| |G|.
 template <int Dim>
 double ElasticEnergy<Dim>::round_off_of(const Displacement<Dim>& u, ConstVectorView x) const {
+  const PatchPressures<Dim> pressures = this->pressures(u);
   const double straight = sum_over_elements([&](std::size_t e) {
     const auto& element = cells_.elements[e];
     const auto at = displacement_gradient<Dim>(element, u);
-    return element.volume *
-           (std::abs(elastic_density<Dim>(at, moduli(e))) + elastic_stress<Dim>(at, moduli(e)).norm() * at.G.norm());
+    const ElasticModuli here = pressures.in_straight(moduli(e), e);
+    return element.volume * (std::abs(elastic_density<Dim>(at, here)) + elastic_stress<Dim>(at, here).norm() * at.G.norm());
   });
-  return kEpsilon * (curved_ ? straight + curved_->size_of_summands(u, x) : straight);
+  const double patches = patched_ ? std::abs(patched_->value(patched_->changes(u))) : 0;
+  return kEpsilon * (patches + (curved_ ? straight + curved_->size_of_summands(u, x, pressures) : straight));
 }
 
 template <int Dim>
 void ElasticEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
+  const PatchPressures<Dim> pressures = this->pressures(u);
   const auto forces_of = [&](std::size_t e) -> Mat<Dim> {  // on all vertices but the first
     const auto& element = cells_.elements[e];
-    const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), moduli(e));
+    const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), pressures.in_straight(moduli(e), e));
     return scale_ * element.volume * P * element.inverse_edges.transpose();
   };
   parallel_then_ordered<Mat<Dim>>(cells_.straight().size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
@@ -211,7 +225,7 @@ void ElasticEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, ConstVector
       gradient.segment<Dim>(Dim * vertices[0]) -= forces.col(k);
     }
   });
-  if (curved_) curved_->add_gradient(u, x, gradient);
+  if (curved_) curved_->add_gradient(u, x, pressures, gradient);
 }
 
 template <int Dim>
@@ -257,12 +271,14 @@ double ElasticEnergy<Dim>::value_round_off_at(const Increment& at, Workspace& wo
 template <int Dim>
 void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
   const Displacement<Dim> u(cells_.rest, x);
+  const std::vector<double> changes = patched_ ? patched_->changes(u) : std::vector<double>();
+  const PatchPressures<Dim> pressures = patched_ ? patched_->pressures(changes) : PatchPressures<Dim>{};
   sink.target().add_elements<Dim>(cells_, [&](std::size_t e, ElementBlock<Dim>& block) {
     const auto& element = cells_.elements[e];
     const auto at = displacement_gradient<Dim>(element, u);
     const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
     const double weight = scale_ * element.volume;
-    const ElasticModuli& here = moduli(e);
+    const ElasticModuli here = pressures.in_straight(moduli(e), e);
     if (here.law == MaterialLaw::neo_hookean) {
       exact_block<Dim>(at, gradients, here.lame, weight, block);
       if (psd != PsdProjection::none)
@@ -271,7 +287,8 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
       block_of_modes<Dim>(elastic_eigensystem<Dim>(at.F(), here), gradients, weight, psd, block);
     }
   });
-  if (curved_) curved_->add_hessian(x, psd, sink);
+  if (curved_) curved_->add_hessian(x, pressures, psd, sink);
+  if (patched_) patched_->add_hessian(x, changes, psd, sink);
 }
 
 template <int Dim>

@@ -17,13 +17,18 @@ namespace itr {
 template <int Dim>
 class QuadraticElasticity;
 template <int Dim>
+class PatchedVolume;
+template <int Dim>
+struct PatchPressures;
+template <int Dim>
 class Displacement;
 
 /// By curved element, see cell_quadrature; empty: all 0.
 using QuadratureLevels = std::vector<std::uint8_t>;
 
-/// scale * integral of W(F) over the rest shape: exact on straight elements, by quadrature on curved ones. Feasible: det F >
-/// 0 everywhere in every element. JacobianBarrier adds to it in distorted curved ones, infinite where it cannot prove that.
+/// scale * integral of W(F) over the rest shape: exact on straight elements, by quadrature on curved ones. Where `cells`
+/// have patches, its volumetric part is that of PatchedVolume. Feasible: det F > 0 everywhere in every element.
+/// JacobianBarrier adds to it in distorted curved ones, infinite where it cannot prove that.
 template <int Dim>
 class ElasticEnergy final : public Energy, public IncrementalTerm {
  public:
@@ -59,6 +64,7 @@ class ElasticEnergy final : public Energy, public IncrementalTerm {
   double sum_over_elements(const F& f) const;
   /// `x` are the positions; only curved elements, of which the validity depends on them, read it.
   double value_of(const Displacement<Dim>& u, ConstVectorView x) const;
+  PatchPressures<Dim> pressures(const Displacement<Dim>& u) const;
   double round_off_of(const Displacement<Dim>& u, ConstVectorView x) const;
   void add_gradient_of(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const;
   ConstVectorView curved_positions(const Increment& at, Workspace& workspace) const;
@@ -68,6 +74,7 @@ class ElasticEnergy final : public Energy, public IncrementalTerm {
   std::vector<ElasticModuli> by_element_;               ///< empty unless moduli vary in space
   double scale_ = 1;
   std::unique_ptr<QuadraticElasticity<Dim>> curved_;  ///< null: all elements are straight
+  std::unique_ptr<PatchedVolume<Dim>> patched_;       ///< null: without patches
 };
 
 }  // namespace itr

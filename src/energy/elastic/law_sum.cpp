@@ -13,10 +13,11 @@ namespace itr {
 
 namespace {
 
-StretchSum respond(const LawSum& sum, const Vec<3>& strains, double log_J) {
-  StretchResponse response(sum.dimension, strains, log_J);
+StretchSum respond(const LawSum& sum, const Vec<3>& strains, double log_J, const CellVolume& volume = {}) {
+  StretchResponse response(sum.dimension, strains, log_J, volume.is_split);
   for (const LawSum::Term& term : sum.terms)
     if (term.row->add) term.row->add(term.values, response);
+  if (volume.is_split) response.add_to_cell(volume_in_cell(volume, log_J));
   return response.sum();
 }
 
@@ -142,8 +143,8 @@ StretchStiffness<Dim> stiffness_of(const StretchSum& response, const Vec<Dim>& s
 
 }  // namespace
 
-StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J) {
-  return sum.is_plane_stress ? respond_in_plane_stress(sum, strains, log_J) : respond(sum, strains, log_J);
+StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J, const CellVolume& volume) {
+  return sum.is_plane_stress ? respond_in_plane_stress(sum, strains, log_J) : respond(sum, strains, log_J, volume);
 }
 
 template <int Dim>
@@ -157,18 +158,18 @@ double thickness(const Mat<Dim>& F, const Material& material) {
 }
 
 template <int Dim>
-double sum_density(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X) {
+double sum_density(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const CellVolume& volume) {
   const Strain<Dim> strain(G);
-  double W = response_to(sum, Principal<Dim>(strain).strains, strain.log_J).value;
+  double W = response_to(sum, Principal<Dim>(strain).strains, strain.log_J, volume).value;
   visit_fibres<Dim>(sum, X, strain, [&](const auto&, const FibreResponse& w) { W += w.value; });
   return W;
 }
 
 template <int Dim>
-Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X) {
+Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const CellVolume& volume) {
   const Strain<Dim> strain(G);
   const Principal<Dim> principal(strain);
-  const StretchSum response = response_to(sum, principal.strains, strain.log_J);
+  const StretchSum response = response_to(sum, principal.strains, strain.log_J, volume);
   const Vec<Dim> nominal = (response.first.array() * (-principal.strains.array()).exp()).template head<Dim>();
   Mat<Dim> P = principal.U * nominal.asDiagonal() * principal.V.transpose();
   visit_fibres<Dim>(sum, X, strain, [&](const auto& x, const FibreResponse& w) { P += w.first * x.gradient(); });
@@ -176,11 +177,11 @@ Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X) {
 }
 
 template <int Dim>
-EigenSystem<Dim> sum_eigensystem(const Mat<Dim>& F, const LawSum& sum, const Vec<3>& X) {
+EigenSystem<Dim> sum_eigensystem(const Mat<Dim>& F, const LawSum& sum, const Vec<3>& X, const CellVolume& volume) {
   const SingularValues<Dim> svd = singular_values(F);
   Vec<3> strains = Vec<3>::Zero();
   strains.template head<Dim>() = svd.s.array().log();
-  const StretchSum response = response_to(sum, strains, strains.sum());
+  const StretchSum response = response_to(sum, strains, strains.sum(), volume);
   const EigenSystem<Dim> isotropic = eigensystem_of<Dim>(svd, stiffness_of<Dim>(response, svd.s));
   if (!sum.terms.back().row->fibre) return isotropic;
   Mat<Dim* Dim> H = Mat<Dim * Dim>::Zero();
@@ -226,10 +227,10 @@ void LawSum::hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) 
     compose(sum_eigensystem<3>(Mat<3>(F), *this, X));
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                     \
-  template double sum_density<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&);               \
-  template Mat<Dim> sum_stress<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&);              \
-  template EigenSystem<Dim> sum_eigensystem<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&); \
+#define ITR_INSTANTIATE(Dim)                                                                                        \
+  template double sum_density<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&);               \
+  template Mat<Dim> sum_stress<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&);              \
+  template EigenSystem<Dim> sum_eigensystem<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&); \
   template double thickness<Dim>(const Mat<Dim>&, const Material&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

@@ -11,17 +11,21 @@
 
 namespace itr {
 
-/// Density and stress take G = F - I, of det F > 0. X is the rest position, which directions of fibres may depend on.
+/// Density and stress take G = F - I, of det F > 0. X is the rest position, which directions of fibres may depend on. Where
+/// `volume` is split, its terms stand for the volumetric parts.
 template <int Dim>
-double sum_density(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X);
+double sum_density(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const CellVolume& volume = {});
 template <int Dim>
-Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X);
+Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const CellVolume& volume = {});
 template <int Dim>
-EigenSystem<Dim> sum_eigensystem(const Mat<Dim>& F, const LawSum& sum, const Vec<3>& X);
+EigenSystem<Dim> sum_eigensystem(const Mat<Dim>& F, const LawSum& sum, const Vec<3>& X, const CellVolume& volume = {});
 
 /// The response to in-plane strains (3D: to all) of the isotropic terms. In plane stress the third strain is eliminated: W
 /// is infinite where there is none that makes the stress across the plane 0.
-StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J);
+StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J, const CellVolume& volume = {});
+
+/// The terms of a split law that stand for its volumetric part in a cell, by ln J.
+VolumeResponse volume_in_cell(const CellVolume& volume, double log_J);
 
 /// F33 of a sum in plane stress; 1 of other laws and in 3D.
 template <int Dim>

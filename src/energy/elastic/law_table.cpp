@@ -18,8 +18,8 @@ constexpr LawCoefficient kBulk = {"K", Range::positive};
 
 /// U = K/4 (J^2 - 1 - 2 ln J).
 void add_bulk(double K, StretchResponse& at) {
-  const double y = 2 * at.log_J();
-  at.add_volume(K / 4 * minus_expm1(y), K / 2 * std::expm1(y), K * std::exp(y));
+  const VolumeResponse U = square_bulk(K, at.log_J());
+  at.add_volume(U.value, U.first, U.second);
 }
 
 /// k/2 (ln J)^2.
@@ -185,6 +185,35 @@ std::string LawSum::name() const {
   std::string text;
   for (const Term& term : terms) text += (text.empty() ? "" : " + ") + std::string(term.row->type);
   return text;
+}
+
+VolumeResponse volume_response(const LawSum& sum, double log_J) {
+  StretchResponse at(sum.dimension, Vec<3>::Zero(), log_J, true);
+  for (const LawSum::Term& term : sum.terms)
+    if (term.row->add) term.row->add(term.values, at);
+  return at.volume();
+}
+
+/// As in plane strain and in 3D nu = 0.45 has; a law that is the sum of two such parts, lambda / mu = 9.
+bool is_nearly_incompressible(const Material& material, int dim) {
+  constexpr double kRatio = 9 * (1 - 1e-9);
+  if (!may_average_volume(material, dim)) return false;
+  if (const LawSum* sum = sum_of(material)) {
+    const RestModuli rest = rest_moduli(*sum);
+    return rest.bulk - 2 * rest.shear / sum->dimension >= kRatio * rest.shear;
+  }
+  if (material.law == MaterialLaw::mooney_rivlin) {
+    const MooneyRivlinModuli& m = material.mooney_rivlin;
+    return m.log_k + 2 * m.volume_d - 2 * material.lame_mu() / dim >= kRatio * material.lame_mu();
+  }
+  return material.lame_lambda(dim) >= kRatio * material.lame_mu();
+}
+
+bool may_average_volume(const Material& material, int dim) {
+  if (material.has_varying_moduli()) return false;
+  if (const LawSum* sum = sum_of(material)) return !sum->is_plane_stress && volume_response(*sum, 0).second > 0;
+  if (material.law == MaterialLaw::mooney_rivlin) return true;
+  return material.law == MaterialLaw::neo_hookean && (dim == 3 || material.plane_strain) && material.lame_lambda(dim) > 0;
 }
 
 RestModuli rest_moduli(const LawSum& sum) {

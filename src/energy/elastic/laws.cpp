@@ -5,6 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,6 +14,7 @@
 #include "itr/core.hpp"
 #include "law_sum.hpp"
 #include "point.hpp"
+#include "strain.hpp"
 
 namespace itr {
 
@@ -58,6 +60,20 @@ EigenSystem<Dim> linear_eigensystem(const LameParameters& lame) {
   return system;
 }
 
+/// U(J) of a law without what its cells keep, by ln J.
+template <int Dim>
+VolumeResponse volume_part(const ElasticModuli& whole, double log_J) {
+  if (const LawSum* sum = sum_of(whole)) return volume_response(*sum, log_J);
+  if (whole.law == MaterialLaw::neo_hookean) {
+    const double lambda = whole.lame.lambda;
+    return {lambda / 2 * log_J * log_J, lambda * log_J, lambda};
+  }
+  const MooneyRivlinModuli& m = whole.mooney_rivlin;
+  const double change = std::expm1(log_J), J = 1 + change;
+  return {m.log_k / 2 * log_J * log_J + m.volume_d * change * change, m.log_k * log_J + 2 * m.volume_d * change * J,
+          m.log_k + 2 * m.volume_d * J * (J + change)};
+}
+
 template <int Dim>
 EigenSystem<Dim> own_eigensystem(const Mat<Dim>& F, const OwnLaw& law) {
   MatrixX H(Dim * Dim, Dim * Dim);
@@ -89,6 +105,38 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
           in_space<Dim>(X)};
 }
 
+VolumeResponse volume_in_cell(const CellVolume& volume, double log_J) {
+  const VolumeResponse u = square_bulk(volume.bulk, log_J);
+  const double change = volume.pressure * std::expm1(log_J), pJ = volume.pressure + change;
+  return {u.value + change, u.first + pJ, u.second + pJ};
+}
+
+template <int Dim>
+ElasticModuli without_volume(ElasticModuli whole) {
+  ElasticModuli cell = whole;
+  cell.volume.is_split = true;
+  if (whole.law == MaterialLaw::neo_hookean) {
+    cell.lame.lambda = 0;
+  } else if (const LawSum* sum = sum_of(whole)) {
+    const RestModuli rest = rest_moduli(*sum);
+    const double left = rest.bulk - volume_response(*sum, 0).second;
+    cell.volume.bulk = std::max(0.0, 2 * rest.shear / sum->dimension - left);
+  } else {
+    cell.mooney_rivlin.log_k = cell.mooney_rivlin.volume_d = 0;
+    cell.volume.bulk = 2 * whole.lame.mu / Dim;
+  }
+  return cell;
+}
+
+template <int Dim>
+VolumeResponse volume_energy(const ElasticModuli& whole, double change) {
+  const double log_J = std::log1p(change), J = 1 + change;
+  const VolumeResponse all = volume_part<Dim>(whole, log_J);
+  const VolumeResponse kept = square_bulk(without_volume<Dim>(whole).volume.bulk, log_J);
+  const double first = all.first - kept.first;
+  return {all.value - kept.value, first / J, (all.second - kept.second - first) / (J * J)};
+}
+
 template <int Dim>
 double mass_density(const Material& material, const Vec<Dim>& X) {
   return material.density_at ? value_at<Dim>(material.density_at, X, "rho", 0, kInfinity) : material.density;
@@ -110,10 +158,12 @@ double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli&
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_density<Dim>(G, lame);
     case MaterialLaw::own:
-      if (const LawSum* sum = sum_of(moduli)) return sum_density<Dim>(G, *sum, moduli.X);
+      if (const LawSum* sum = sum_of(moduli)) return sum_density<Dim>(G, *sum, moduli.X, moduli.volume);
       return moduli.own->density(at.F());
-    default:
-      return mooney_rivlin_density<Dim>(G, moduli.mooney_rivlin);
+    default: {
+      const double W = mooney_rivlin_density<Dim>(G, moduli.mooney_rivlin);
+      return moduli.volume.is_split ? W + volume_in_cell(moduli.volume, Strain<Dim>(G).log_J).value : W;
+    }
   }
 }
 
@@ -135,13 +185,17 @@ Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli
     case MaterialLaw::fixed_corotated:
       return fixed_corotated_stress<Dim>(G, lame);
     case MaterialLaw::own: {
-      if (const LawSum* sum = sum_of(moduli)) return sum_stress<Dim>(G, *sum, moduli.X);
+      if (const LawSum* sum = sum_of(moduli)) return sum_stress<Dim>(G, *sum, moduli.X, moduli.volume);
       MatrixX P(Dim, Dim);
       moduli.own->stress(at.F(), P);
       return P;
     }
-    default:
-      return mooney_rivlin_stress<Dim>(G, moduli.mooney_rivlin);
+    default: {
+      const Mat<Dim> P = mooney_rivlin_stress<Dim>(G, moduli.mooney_rivlin);
+      if (!moduli.volume.is_split) return P;
+      const Strain<Dim> strain(G);
+      return P + volume_in_cell(moduli.volume, strain.log_J).first * strain.inverse_transpose();
+    }
   }
 }
 
@@ -151,7 +205,7 @@ EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& mod
   if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
   if (moduli.law == MaterialLaw::own) {
     const LawSum* sum = sum_of(moduli);
-    return sum ? sum_eigensystem<Dim>(F, *sum, moduli.X) : own_eigensystem<Dim>(F, *moduli.own);
+    return sum ? sum_eigensystem<Dim>(F, *sum, moduli.X, moduli.volume) : own_eigensystem<Dim>(F, *moduli.own);
   }
   const SingularValues<Dim> svd = singular_values(F);
   switch (moduli.law) {
@@ -159,14 +213,25 @@ EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& mod
       return isotropic_eigensystem<Dim>(svd, saint_venant_derivatives<Dim>(svd.s, moduli.lame));
     case MaterialLaw::fixed_corotated:
       return isotropic_eigensystem<Dim>(svd, fixed_corotated_derivatives<Dim>(svd.s, moduli.lame));
-    default:
-      return isotropic_eigensystem<Dim>(svd, mooney_rivlin_derivatives<Dim>(svd.s, moduli.mooney_rivlin));
+    default: {
+      using I = InvariantDerivatives;
+      I W = mooney_rivlin_derivatives<Dim>(svd.s, moduli.mooney_rivlin);
+      if (moduli.volume.is_split) {
+        const double J = svd.s.prod();
+        const VolumeResponse U = volume_in_cell(moduli.volume, std::log(J));
+        W.first[I::J] += U.first / J;
+        W.second(I::J, I::J) += (U.second - U.first) / (J * J);
+      }
+      return isotropic_eigensystem<Dim>(svd, W);
+    }
   }
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                     \
   template ElasticModuli elastic_moduli<Dim>(const Material&, const Vec<Dim>&);                  \
   template double mass_density<Dim>(const Material&, const Vec<Dim>&);                           \
+  template ElasticModuli without_volume<Dim>(ElasticModuli);                                     \
+  template VolumeResponse volume_energy<Dim>(const ElasticModuli&, double);                      \
   template double elastic_density<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&);  \
   template Mat<Dim> elastic_stress<Dim>(const DisplacementGradient<Dim>&, const ElasticModuli&); \
   template EigenSystem<Dim> elastic_eigensystem<Dim>(const Mat<Dim>&, const ElasticModuli&);

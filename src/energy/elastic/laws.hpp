@@ -11,9 +11,18 @@
 #pragma once
 
 #include "energy/elastic/neo_hookean.hpp"
+#include "energy/elastic/volume_response.hpp"
 #include "itr/options.hpp"
 
 namespace itr {
+
+/// Terms that a cell has instead of U(J), the volumetric part of its law, where U is a function of the mean J over patches
+/// (fem/volume_patches.hpp): bulk/4 (J^2 - 1 - 2 ln J) + pressure (J - 1).
+struct CellVolume {
+  bool is_split = false;
+  double bulk = 0;      ///< that the other part of the law lacks to resist as neo-Hookean cells of lambda = 0 do [Pa]
+  double pressure = 0;  ///< dU/dJ of the patches [Pa]
+};
 
 /// A law with its moduli at one place.
 struct ElasticModuli {
@@ -22,11 +31,21 @@ struct ElasticModuli {
   MooneyRivlinModuli mooney_rivlin{};
   const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
   Vec<3> X = Vec<3>::Zero();    ///< rest position, which directions of fibres depend on
+  CellVolume volume{};
+
+  void set_pressure(double pressure) { lame.pressure = volume.pressure = pressure; }
 };
 
 /// Moduli of a material at rest position X.
 template <int Dim>
 ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X);
+/// Parts a law (one of may_average_volume, energy/elastic/law_table.hpp): its density at F is that of without_volume<Dim>
+/// plus volume_energy at J = det F.
+template <int Dim>
+ElasticModuli without_volume(ElasticModuli whole);
+/// U and its derivatives by J at J = 1 + change.
+template <int Dim>
+VolumeResponse volume_energy(const ElasticModuli& whole, double change);
 /// Density [kg/m^Dim] of a material at rest position X.
 template <int Dim>
 double mass_density(const Material& material, const Vec<Dim>& X);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// With F = U diag(s) V^T and dF = U A V^T, the second derivative is mu A + c S^-1 A^T S^-1 + lambda (S^-1 : A) S^-1, where
-// c = mu - lambda ln J. Diagonal entries of A decouple from the others; each pair (A_ij, A_ji) has one symmetric and one
-// skew mode (Smith et al. 2019, "Analytic eigensystems for isotropic distortion energies").
+// With F = U diag(s) V^T and dF = U A V^T, the second derivative is mu A + c S^-1 A^T S^-1 + l (S^-1 : A) S^-1, where
+// l = lambda + p J and c = mu - lambda ln J - p J. Diagonal entries of A decouple from the others; each pair (A_ij, A_ji)
+// has one symmetric and one skew mode (Smith et al. 2019, "Analytic eigensystems for isotropic distortion energies").
 #include "energy/elastic/neo_hookean.hpp"
 
 #include <Eigen/Eigenvalues>
@@ -25,12 +25,19 @@ Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame) {
 
 namespace {
 
-/// d2W / ds_i ds_j of the singular values; c = mu - lambda ln J.
+/// The numbers l and c.
 template <int Dim>
-Eigen::SelfAdjointEigenSolver<Mat<Dim>> decompose_stretch(const Vec<Dim>& s, const LameParameters& lame, double c) {
+std::array<double, 2> volume_stiffness(const Mat<Dim>& F, const LameParameters& lame) {
+  const double J = F.determinant(), pJ = lame.pressure * J;
+  return {lame.lambda + pJ, lame.mu - lame.lambda * std::log(J) - pJ};
+}
+
+/// d2W / ds_i ds_j of the singular values.
+template <int Dim>
+Eigen::SelfAdjointEigenSolver<Mat<Dim>> decompose_stretch(const Vec<Dim>& s, double mu, double l, double c) {
   Mat<Dim> stretch;
   for (int i = 0; i < Dim; ++i)
-    for (int j = 0; j < Dim; ++j) stretch(i, j) = lame.lambda / (s[i] * s[j]) + (i == j ? lame.mu + c / (s[i] * s[i]) : 0);
+    for (int j = 0; j < Dim; ++j) stretch(i, j) = l / (s[i] * s[j]) + (i == j ? mu + c / (s[i] * s[i]) : 0);
   Eigen::SelfAdjointEigenSolver<Mat<Dim>> solver;
   if constexpr (Dim == 2)
     solver.computeDirect(stretch);
@@ -57,8 +64,8 @@ void visit_pairs(const SingularValues<Dim>& svd, double mu, double c, const Visi
 template <int Dim>
 EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame) {
   const SingularValues<Dim> svd = singular_values(F);
-  const double c = lame.mu - lame.lambda * std::log(F.determinant());
-  const auto stretch = decompose_stretch<Dim>(svd.s, lame, c);
+  const auto [l, c] = volume_stiffness<Dim>(F, lame);
+  const auto stretch = decompose_stretch<Dim>(svd.s, lame.mu, l, c);
   EigenSystem<Dim> system;
   int k = 0;
   for (; k < Dim; ++k) {
@@ -75,10 +82,10 @@ EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters
 template <int Dim>
 NegativeModes<Dim> neo_hookean_negative_modes(const Mat<Dim>& F, const LameParameters& lame) {
   const SingularValues<Dim> svd = singular_values(F);
-  const double c = lame.mu - lame.lambda * std::log(F.determinant());
+  const auto [l, c] = volume_stiffness<Dim>(F, lame);
   NegativeModes<Dim> negative;
-  if (c < 0) {  // else the stretches are a sum of positive terms
-    const auto stretch = decompose_stretch<Dim>(svd.s, lame, c);
+  if (c < 0 || l < 0) {  // else the stretches are a sum of positive terms
+    const auto stretch = decompose_stretch<Dim>(svd.s, lame.mu, l, c);
     for (int k = 0; k < Dim && stretch.eigenvalues()[k] < 0; ++k) {
       negative.values[negative.count] = stretch.eigenvalues()[k];
       negative.modes[negative.count++] = svd.U * stretch.eigenvectors().col(k).asDiagonal() * svd.V.transpose();

@@ -7,8 +7,9 @@
 namespace itr {
 
 struct LameParameters {
-  double mu = 0;      ///< [Pa]
-  double lambda = 0;  ///< [Pa]
+  double mu = 0;        ///< [Pa]
+  double lambda = 0;    ///< [Pa]
+  double pressure = 0;  ///< p of a term p (J - 1), see CellVolume [Pa]
 };
 
 /// W(F) [J/m^Dim]; +infinity where det F <= 0.

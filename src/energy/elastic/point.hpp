@@ -20,20 +20,21 @@ class NeoHookeanPoint {
   NeoHookeanPoint(const DisplacementGradient<Dim>& at, const LameParameters& lame) : strain_(at.G), lame_(lame) {}
 
   double density() const {
-    return strain_.J() > 0 ? lame_.mu / 2 * strain_.trace_minus_log() + lame_.lambda / 2 * strain_.log_J * strain_.log_J
-                           : std::numeric_limits<double>::infinity();
+    if (!(strain_.J() > 0)) return std::numeric_limits<double>::infinity();
+    return lame_.mu / 2 * strain_.trace_minus_log() + lame_.lambda / 2 * strain_.log_J * strain_.log_J +
+           lame_.pressure * strain_.J_minus_1;
   }
   Mat<Dim> inverse() const { return strain_.F.inverse(); }
-  /// F^-T (mu (C - I) + lambda ln J), in which nothing cancels.
+  /// F^-T (mu (C - I) + lambda ln J + p J), in which nothing cancels.
   Mat<Dim> stress(const Mat<Dim>& inverse) const {
     Mat<Dim> inner = lame_.mu * strain_.A;
-    inner.diagonal().array() += lame_.lambda * strain_.log_J;
+    inner.diagonal().array() += lame_.lambda * strain_.log_J + lame_.pressure * strain_.J();
     return inverse.transpose() * inner;
   }
 
   /// Second derivatives times a weight, by vertices whose shape functions have the gradients g_i and g_j.
   struct Stiffness {
-    double c, lambda, mu;  ///< times the weight; c = mu - lambda ln J
+    double c, lambda, mu;  ///< times the weight; c = mu - lambda ln J - p J, and p J is part of lambda
 
     /// The part of components a of i and b of j that depends on F: h = F^-T g.
     template <typename Column>
@@ -47,7 +48,8 @@ class NeoHookeanPoint {
     }
   };
   Stiffness stiffness(double weight) const {
-    return {weight * (lame_.mu - lame_.lambda * strain_.log_J), weight * lame_.lambda, weight * lame_.mu};
+    const double pJ = lame_.pressure * strain_.J();
+    return {weight * (lame_.mu - lame_.lambda * strain_.log_J - pJ), weight * (lame_.lambda + pJ), weight * lame_.mu};
   }
 
  private:

@@ -21,6 +21,7 @@
 #include "geometry/quadratic_validity.hpp"
 #include "itr/types.hpp"
 #include "jacobian_barrier.hpp"
+#include "patched_volume.hpp"
 
 namespace itr {
 
@@ -84,8 +85,8 @@ class ModalSum {
 };
 
 /// The sum over points of neo-Hookean Hessians, not projected: with h = F^-T grad of the shape functions, the entry of nodes
-/// a, b and directions i, j is lambda h_ai h_bj + c h_aj h_bi + (i == j) mu grad_a . grad_b. Directions are kept apart,
-/// which makes columns of one node's entries.
+/// a, b and directions i, j is l h_ai h_bj + c h_aj h_bi + (i == j) mu grad_a . grad_b (neo_hookean.cpp). Directions are
+/// kept apart, which makes columns of one node's entries.
 template <int Dim>
 class NeoHookeanSum {
  public:
@@ -98,8 +99,9 @@ class NeoHookeanSum {
     }
   }
   void add(const Mat<Dim>& F, const Nodal<Dim>& gradients, const LameParameters& lame, double weight) {
-    const double c = weight * (lame.mu - lame.lambda * std::log(F.determinant()));
-    const double lambda = weight * lame.lambda, mu = weight * lame.mu;
+    const double J = F.determinant(), pJ = lame.pressure * J;
+    const double c = weight * (lame.mu - lame.lambda * std::log(J) - pJ);
+    const double lambda = weight * (lame.lambda + pJ), mu = weight * lame.mu;
     const Nodal<Dim> transformed = F.inverse().transpose() * gradients;
     double h[Dim][kPadded] = {}, g[Dim][kPadded] = {};
     for (int i = 0; i < Dim; ++i)
@@ -166,11 +168,11 @@ template <int Dim>
 class QuadraticElasticity {
  public:
   QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale, int degree)
-      : cells_(cells), elements_(cells.curved()), degree_(degree), scale_(scale) {
+      : cells_(cells), elements_(cells.curved()), first_(cells.straight().size()), degree_(degree), scale_(scale) {
     bool varies = false;
     for (const auto& [body, material] : materials) {
       varies = varies || material.has_varying_moduli();
-      by_body_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+      by_body_[body] = cell_moduli<Dim>(cells, material, Vec<Dim>::Zero());
     }
     by_element_.reserve(elements_.size());
     for (const Element& element : elements_) by_element_.push_back(&by_body_.at(element.body));
@@ -181,11 +183,12 @@ class QuadraticElasticity {
 
   /// `x` are the positions that `u` leads to.
   double value(const Displacement<Dim>& u, ConstVectorView x) const {
-    return sum_over_cells(u, x, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+    return sum_over_cells(u, x, {}, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
       return elastic_density<Dim>(at, moduli);
     });
   }
-  void add_gradient(const Displacement<Dim>& u, ConstVectorView x, VectorView gradient) const {
+  void add_gradient(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures,
+                    VectorView gradient) const {
     const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
       const Element& element = elements_[e];
       const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
@@ -194,7 +197,7 @@ class QuadraticElasticity {
       for (std::size_t q = 0; q < rule.size(); ++q) {
         const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
         const DisplacementGradient<Dim> at{displacements * gradients.transpose()};
-        const Mat<Dim> P = elastic_stress<Dim>(at, moduli(e, q));
+        const Mat<Dim> P = elastic_stress<Dim>(at, pressures.in(moduli(e, q), first_ + e, rule[q].weights));
         forces.noalias() += (scale_ * rule[q].fraction * element.volume) * (P * gradients);
       }
       if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x)); barrier.is_active())
@@ -209,12 +212,12 @@ class QuadraticElasticity {
                                       });
   }
   /// The sum of |W| + |P| |G| over points: what value() rounds.
-  double size_of_summands(const Displacement<Dim>& u, ConstVectorView x) const {
-    return sum_over_cells(u, x, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+  double size_of_summands(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures) const {
+    return sum_over_cells(u, x, pressures, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
       return std::abs(elastic_density<Dim>(at, moduli)) + elastic_stress<Dim>(at, moduli).norm() * at.G.norm();
     });
   }
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink) const {
+  void add_hessian(ConstVectorView x, const PatchPressures<Dim>& pressures, PsdProjection psd, HessianSink& sink) const {
     sink.target().add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
       const Element& element = elements_[e];
       const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
@@ -227,7 +230,7 @@ class QuadraticElasticity {
         const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
         const Mat<Dim> F = positions * gradients.transpose();
         const double weight = scale_ * rule[q].fraction * element.volume;
-        const ElasticModuli& here = moduli(e, q);
+        const ElasticModuli here = pressures.in(moduli(e, q), first_ + e, rule[q].weights);
         if (!is_neo_hookean) {
           modes.add(elastic_eigensystem<Dim>(F, here), psd, gradients, weight);
           continue;
@@ -271,6 +274,9 @@ class QuadraticElasticity {
     return true;
   }
   const QuadratureLevels& levels() const { return levels_; }
+  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
+    return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
+  }
   void set_levels(const QuadratureLevels& levels) {
     levels_ = levels;
     sample_moduli();
@@ -286,15 +292,13 @@ class QuadraticElasticity {
   using Element = typename CellSet<Dim>::Element;
   static constexpr int kNodes = kQuadraticNodes<Dim>;
 
-  const std::vector<QuadraturePoint<Dim>>& rule(std::size_t e) const {
-    return cell_quadrature<Dim>(levels_.empty() ? 0 : levels_[e], degree_);
-  }
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
   /// Sums share * volume * at_point(G, moduli) over all points, and the barriers.
   template <typename F>
-  double sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const F& at_point) const {
+  double sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures,
+                        const F& at_point) const {
     return scale_ * parallel_sum(elements_.size(), kCurvedBlock, [&](std::size_t begin, std::size_t end) {
              double sum = 0;
              for (std::size_t e = begin; e < end; ++e) {
@@ -303,7 +307,8 @@ class QuadraticElasticity {
                const auto& rule = this->rule(e);
                for (std::size_t q = 0; q < rule.size(); ++q) {
                  const Mat<Dim> G = displacements * shape_gradients<Dim>(element, rule[q].weights).transpose();
-                 sum += rule[q].fraction * element.volume * at_point(DisplacementGradient<Dim>{G}, moduli(e, q));
+                 sum += rule[q].fraction * element.volume *
+                        at_point(DisplacementGradient<Dim>{G}, pressures.in(moduli(e, q), first_ + e, rule[q].weights));
                }
                const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x));
                sum += element.volume * barrier_density<Dim>(barrier, moduli_at_barycenter(e));
@@ -319,10 +324,11 @@ class QuadraticElasticity {
     for (std::size_t e = 0; e < by_element_.size(); ++e) {
       const Element& element = elements_[e];
       first_varying_.push_back(varying_.size());
-      at_barycenters_.push_back(elastic_moduli<Dim>(materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
+      at_barycenters_.push_back(
+          cell_moduli<Dim>(cells_, materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
       for (const auto& point : rule(e))
         varying_.push_back(
-            elastic_moduli<Dim>(materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
+            cell_moduli<Dim>(cells_, materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
     }
   }
   /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.
@@ -343,6 +349,7 @@ class QuadraticElasticity {
 
   const CellSet<Dim>& cells_;
   std::span<const Element> elements_;  ///< the curved ones
+  std::size_t first_;                  ///< number of the first of them in the cells
   int degree_;                         ///< of level 0
   QuadratureLevels levels_;
   std::map<int, Material> materials_;  ///< empty unless moduli vary in space

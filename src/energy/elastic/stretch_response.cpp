@@ -14,6 +14,11 @@ double sinh_ratio(double x) {
   return std::sinh(x) / x;
 }
 
+VolumeResponse square_bulk(double bulk, double log_J) {
+  const double y = 2 * log_J;
+  return {bulk / 4 * minus_expm1(y), bulk / 2 * std::expm1(y), bulk * std::exp(y)};
+}
+
 /// The sum of exp(y) - 1 - y with y = alpha times a strain: isochoric strains add up to 0.
 StretchSum StretchResponse::powers_of(double alpha, const Vec<3>& strains) const {
   StretchSum S;
@@ -60,9 +65,14 @@ void StretchResponse::add(double f, double d1, double d2, const StretchSum& S) {
 }
 
 void StretchResponse::add_volume(double U, double d1, double d2) {
-  sum_.value += U;
-  sum_.first.head(dimension_).array() += d1;
-  sum_.second.topLeftCorner(dimension_, dimension_).array() += d2;
+  volume_ = {volume_.value + U, volume_.first + d1, volume_.second + d2};
+  if (!is_split_) add_to_cell({U, d1, d2});
+}
+
+void StretchResponse::add_to_cell(const VolumeResponse& by_log_J) {
+  sum_.value += by_log_J.value;
+  sum_.first.head(dimension_).array() += by_log_J.first;
+  sum_.second.topLeftCorner(dimension_, dimension_).array() += by_log_J.second;
 }
 
 }  // namespace itr

@@ -3,6 +3,7 @@
 // powers of stretches, in which neither values nor derivatives cancel at small strains or at equal stretches.
 #pragma once
 
+#include "energy/elastic/volume_response.hpp"
 #include "itr/types.hpp"
 
 namespace itr {
@@ -18,16 +19,21 @@ struct StretchSum {
 /// sinh(x) / x.
 double sinh_ratio(double x);
 
+/// bulk/4 (J^2 - 1 - 2 ln J), by ln J.
+VolumeResponse square_bulk(double bulk, double log_J);
+
 /// Accumulates W at given strains. `first` are then principal Kirchhoff stresses [Pa].
 class StretchResponse {
  public:
-  /// `dimension`: how many stretches the law has, 3, or 2 where those in the plane are all. `log_J` is their sum.
-  StretchResponse(int dimension, const Vec<3>& strains, double log_J)
-      : dimension_(dimension), strains_(strains), log_J_(log_J) {}
+  /// `dimension`: how many stretches the law has, 3, or 2 where those in the plane are all. `log_J` is their sum. With
+  /// `is_split` the sum has no volumetric parts.
+  StretchResponse(int dimension, const Vec<3>& strains, double log_J, bool is_split = false)
+      : dimension_(dimension), strains_(strains), log_J_(log_J), is_split_(is_split) {}
 
   int dimension() const { return dimension_; }
   double log_J() const { return log_J_; }
   const StretchSum& sum() const { return sum_; }
+  const VolumeResponse& volume() const { return volume_; }  ///< volumetric parts, by ln J
 
   /// sum_i (t_i^alpha - 1) of isochoric stretches t_i = J^(-1/dimension) s_i.
   StretchSum isochoric_powers(double alpha) const;
@@ -39,8 +45,10 @@ class StretchResponse {
   /// Adds f(S); `d1`, `d2`: f' and f''.
   void add(double f, double d1, double d2, const StretchSum& S);
   void add(double factor, const StretchSum& S) { add(factor * S.value, factor, 0, S); }
-  /// Adds U(ln J) with its derivatives by ln J.
+  /// Adds U(ln J) with its derivatives by ln J, as a volumetric part.
   void add_volume(double U, double d1, double d2);
+  /// Adds a function of ln J that stays in the cells.
+  void add_to_cell(const VolumeResponse& by_log_J);
 
  private:
   StretchSum powers_of(double alpha, const Vec<3>& strains) const;
@@ -48,7 +56,9 @@ class StretchResponse {
   int dimension_;
   Vec<3> strains_;
   double log_J_;
+  bool is_split_;
   StretchSum sum_;
+  VolumeResponse volume_;
 };
 
 }  // namespace itr

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include "patched_volume.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
+
+#include "core/parallel_reduce.hpp"
+#include "energy/energy.hpp"
+#include "fem/hessian_sink.hpp"
+#include "fem/volume_patches.hpp"
+#include "strain.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr std::size_t kElements = 256, kPatches = 64;  ///< of a task
+
+/// Derivatives of det F by F: the columns of F^-T times det F.
+Mat<2> cofactors(const Mat<2>& F) {
+  Mat<2> C;
+  C << F(1, 1), -F(1, 0), -F(0, 1), F(0, 0);
+  return C;
+}
+Mat<3> cofactors(const Mat<3>& F) {
+  Mat<3> C;
+  C << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
+  return C;
+}
+
+template <int Dim>
+double volume_change(const Mat<Dim>& G) {
+  return G.trace() + sum_of_minors(G);
+}
+
+}  // namespace
+
+template <int Dim>
+void add_patches(const std::map<int, Material>& materials, CellSet<Dim>& cells) {
+  const auto is_averaged = [&](int body) {
+    const auto it = materials.find(body);
+    return it != materials.end() && it->second.volume == VolumeForm::patches;
+  };
+  const auto asks = [&](const auto& entry) { return is_averaged(entry.first); };
+  cells.patches = std::ranges::any_of(materials, asks) ? volume_patches<Dim>(cells, is_averaged) : nullptr;
+}
+
+template <int Dim>
+PatchedVolume<Dim>::PatchedVolume(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale,
+                                  RuleOf rule_of)
+    : cells_(cells), scale_(scale), rule_of_(std::move(rule_of)) {
+  for (const auto& [body, material] : materials)
+    if (material.volume == VolumeForm::patches) whole_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+}
+
+template <int Dim>
+std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) const {
+  constexpr int kParts = VolumePatches<Dim>::kParts;
+  const VolumePatches<Dim>& patches = *cells_.patches;
+  const std::size_t straight = cells_.straight().size();
+  std::vector<std::array<double, kParts>> of_element(cells_.elements.size());  // integrals of w (J - 1)
+  parallel_blocks(of_element.size(), kElements, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const auto& element = cells_.elements[e];
+      if (e < straight) {
+        Mat<Dim> edges;
+        for (int k = 0; k < Dim; ++k) edges.col(k) = u.difference(element.vertices[0], element.vertices[k + 1]);
+        of_element[e].back() = element.volume * volume_change<Dim>(edges * element.inverse_edges);
+        continue;
+      }
+      of_element[e].fill(0);
+      Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> displacements;
+      const auto nodes = element.nodes();
+      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) displacements.col(k) = u.difference(nodes[0], nodes[k]);
+      for (const auto& point : rule_of_(e - straight)) {
+        const double change = volume_change<Dim>(displacements * shape_gradients<Dim>(element, point.weights).transpose());
+        for (int part = 0; part < kParts; ++part)
+          if (patches.patch_of[e][part] != kNone)
+            of_element[e][part] +=
+                point.fraction * element.volume * patches.weight(static_cast<int>(e), part, point.weights) * change;
+      }
+    }
+  });
+  std::vector<double> changes(patches.count());
+  parallel_blocks(changes.size(), kPatches, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      double sum = 0;
+      for (const auto& member : patches.members_of(i)) sum += of_element[member.element][member.part];
+      changes[i] = sum / patches.volume[i];
+    }
+  });
+  return changes;
+}
+
+template <int Dim>
+double PatchedVolume<Dim>::value(const std::vector<double>& changes) const {
+  return scale_ * parallel_sum(changes.size(), kPatches, [&](std::size_t begin, std::size_t end) {
+           double sum = 0;
+           for (std::size_t i = begin; i < end; ++i) sum += cells_.patches->volume[i] * response(i, changes[i]).value;
+           return sum;
+         });
+}
+
+template <int Dim>
+PatchPressures<Dim> PatchedVolume<Dim>::pressures(const std::vector<double>& changes) const {
+  PatchPressures<Dim> result{cells_.patches.get(), {}};
+  for (std::size_t i = 0; i < changes.size(); ++i) result.values.push_back(response(i, changes[i]).first);
+  return result;
+}
+
+template <int Dim>
+std::vector<double> PatchedVolume<Dim>::densities(const std::vector<double>& changes) const {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < changes.size(); ++i) result.push_back(response(i, changes[i]).value);
+  return result;
+}
+
+template <int Dim>
+VectorX PatchedVolume<Dim>::gradient_of(std::size_t patch, ConstVectorView x) const {
+  const VolumePatches<Dim>& patches = *cells_.patches;
+  const auto nodes = patches.nodes_of(patch);
+  const std::size_t straight = cells_.straight().size();
+  VectorX gradient = VectorX::Zero(Dim * static_cast<Eigen::Index>(nodes.size()));
+  const auto add = [&](int node, const Vec<Dim>& force) {
+    const auto place = std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin();
+    gradient.segment<Dim>(Dim * place) += force;
+  };
+  for (const auto& [e, part] : patches.members_of(patch)) {
+    const auto& element = cells_.elements[e];
+    if (static_cast<std::size_t>(e) < straight) {
+      const Mat<Dim> C = element.volume * cofactors(deformation_gradient<Dim>(element, x));
+      const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
+      for (int k = 0; k <= Dim; ++k) add(element.vertices[k], C * gradients.col(k));
+      continue;
+    }
+    const auto of_element = element.nodes();
+    const auto positions = at_nodes<Dim>(of_element, x);
+    Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> forces;
+    forces.setZero();
+    for (const auto& point : rule_of_(static_cast<std::size_t>(e) - straight)) {
+      const auto gradients = shape_gradients<Dim>(element, point.weights);
+      const Mat<Dim> F = positions * gradients.transpose();
+      forces += point.fraction * element.volume * patches.weight(e, part, point.weights) * (cofactors(F) * gradients);
+    }
+    for (int k = 0; k < kQuadraticNodes<Dim>; ++k) add(of_element[k], forces.col(k));
+  }
+  return gradient;
+}
+
+template <int Dim>
+void PatchedVolume<Dim>::add_hessian(ConstVectorView x, const std::vector<double>& changes, PsdProjection psd,
+                                     HessianSink& sink) const {
+  const auto make = [&](std::size_t i) { return gradient_of(i, x); };
+  parallel_then_ordered<VectorX>(changes.size(), kPatches, make, [&](std::size_t i, const VectorX& gradient) {
+    const double second = projected(response(i, changes[i]).second, psd);
+    if (second == 0) return;
+    const MatrixX block = (scale_ * second / cells_.patches->volume[i]) * gradient * gradient.transpose();
+    sink.add<Dim>(cells_.patches->nodes_of(i), block.data());
+  });
+}
+
+template void add_patches(const std::map<int, Material>&, CellSet<2>&);
+template void add_patches(const std::map<int, Material>&, CellSet<3>&);
+template class PatchedVolume<2>;
+template class PatchedVolume<3>;
+
+}  // namespace itr
