@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <numbers>
 
 #include "fem/quadrature.hpp"
 #include "geometry/measures.hpp"
@@ -79,6 +80,46 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
   return weights;
 }
 
+/// A point of an edge that is turned, with its shape functions and their derivatives along the edge.
+struct TurnedPoint {
+  using Nodal = Eigen::Matrix<double, 2, kQuadraticNodes<1>>;
+  Vec<kQuadraticNodes<1>> shapes, slopes;
+  double r, dr, dz;  ///< radius, and derivatives of the position along the edge
+
+  TurnedPoint(CurvedEdges curved, const std::array<double, 2>& l, const Nodal& x)
+      : shapes(quadratic_shapes<1>(curved, l)),
+        slopes(quadratic_gradients<1, 1>(curved, l, Eigen::RowVector2d(-1, 1)).transpose()),
+        r(x.row(0) * shapes),
+        dr(x.row(0) * slopes),
+        dz(x.row(1) * slopes) {}
+
+  double volume() const { return std::numbers::pi * r * r * dz; }
+  Nodal gradient() const {
+    Nodal g;
+    g.row(0) = 2 * std::numbers::pi * r * dz * shapes.transpose();
+    g.row(1) = std::numbers::pi * r * r * slopes.transpose();
+    return g;
+  }
+  /// Area times normal, shared by shape functions.
+  Nodal normal() const { return 2 * std::numbers::pi * r * Vec<2>(dz, -dr) * shapes.transpose(); }
+  Mat<2 * kQuadraticNodes<1>> hessian() const {
+    Mat<2 * kQuadraticNodes<1>> H = Mat<2 * kQuadraticNodes<1>>::Zero();
+    for (int a = 0; a < kQuadraticNodes<1>; ++a)
+      for (int b = 0; b < kQuadraticNodes<1>; ++b) {
+        H(2 * a, 2 * b) = 2 * std::numbers::pi * dz * shapes[a] * shapes[b];
+        H(2 * a, 2 * b + 1) = H(2 * b + 1, 2 * a) = 2 * std::numbers::pi * r * shapes[a] * slopes[b];
+      }
+    return H;
+  }
+};
+
+/// Adds the columns to the entries of a facet's nodes; at a straight edge the last column is zero.
+template <typename Facet, typename Forces>
+void add_by_nodes(const Facet& facet, const Forces& forces, auto&& sum) {
+  for (std::size_t n = 0; n < facet.nodes.size(); ++n)
+    sum.template segment<2>(2 * facet.nodes[n]) += forces.col(static_cast<Eigen::Index>(n));
+}
+
 /// Barycenter of a facet as a point of its body.
 template <int Dim>
 RestPoint<Dim> middle_of(const std::array<int, Dim>& nodes, int part, const CellSet<Dim>& cells) {
@@ -96,13 +137,13 @@ RestPoint<Dim> middle_of(const std::array<int, Dim>& nodes, int part, const Cell
 template <int Dim>
 PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>& loads, ConstVectorView lagged_x,
                                     double scale)
-    : correction_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
+    : axisymmetric_(cells.axisymmetric), correction_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
   for (const bool is_curved : {false, true})
     for (const auto& facet : cells.facets)
       for (const auto& [tag, pressure] : loads.pressures) {
         if (tag != facet.tag || is_curved != (facet.curved != 0)) continue;
         const RestPoint<Dim> middle = middle_of<Dim>(facet.vertices, facet.part, cells);
-        if (is_curved)
+        if (is_curved || axisymmetric_)
           curves_.push_back({facet.nodes(), facet.curved, pressure(middle)});
         else
           facets_.push_back({facet.vertices, pressure(middle)});
@@ -118,6 +159,11 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
     for (int k = 0; k < Dim; ++k)
       correction_.segment<Dim>(Dim * facet.vertices[k]) += facet.pressure * (fraction - gradient.col(k));
   }
+  for_each_turned(lagged_x, [&](const CurvedLoadedFacet& facet, double pressure, const TurnedPoint& point) {
+    const TurnedPoint::Nodal normal = pressure * point.normal();
+    largest_force_ = std::max(largest_force_, normal.norm());
+    add_by_nodes(facet, normal - pressure * point.gradient(), correction_);
+  });
   for_each_cone(lagged_x, [&](const CurvedLoadedFacet& facet, double pressure, const auto& weights, const Corners& p) {
     const Corners gradient = cone_gradient(p);
     const Vec<Dim> normal = Dim * corner_fraction(p);
@@ -132,6 +178,9 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
   for_each_cone(rest, [&](const CurvedLoadedFacet&, double pressure, const auto&, const Corners& p) {
     rest_work_ += pressure * cone_volume<Dim>(p);
   });
+  for_each_turned(rest, [&](const CurvedLoadedFacet&, double pressure, const TurnedPoint& point) {
+    rest_work_ += pressure * point.volume();
+  });
   for (int v = 0; v < cells.num_vertices; ++v) rest_work_ += correction_.segment<Dim>(Dim * v).dot(cells.rest[v]);
 }
 
@@ -145,6 +194,7 @@ auto PressureEnergy<Dim>::corners(const LoadedFacet& facet, ConstVectorView x) c
 template <int Dim>
 template <typename F>
 void PressureEnergy<Dim>::for_each_cone(ConstVectorView x, const F& f) const {
+  if (axisymmetric_) return;
   constexpr int kDegree = Dim == 2 ? 3 : 4;  // of det(x, t1, t2), and of a shape function times the normal
   for (const CurvedLoadedFacet& facet : curves_) {
     auto nodes = at_nodes<Dim>(facet.nodes, x);
@@ -157,12 +207,26 @@ void PressureEnergy<Dim>::for_each_cone(ConstVectorView x, const F& f) const {
 }
 
 template <int Dim>
+template <typename F>
+void PressureEnergy<Dim>::for_each_turned(ConstVectorView x, const F& f) const {
+  if constexpr (Dim == 2) {
+    constexpr int kDegree = 5;  // of r^2 dz
+    if (!axisymmetric_) return;
+    for (const CurvedLoadedFacet& facet : curves_)
+      for (const auto& point : quadrature<1>(kDegree))
+        f(facet, facet.pressure * point.fraction, TurnedPoint(facet.curved, point.weights, at_nodes<2>(facet.nodes, x)));
+  }
+}
+
+template <int Dim>
 double PressureEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
   double sum = correction_.dot(x) - rest_work_;
   for (const LoadedFacet& facet : facets_) sum += facet.pressure * cone_volume<Dim>(corners(facet, x));
   for_each_cone(x, [&](const CurvedLoadedFacet&, double pressure, const auto&, const Corners& p) {
     sum += pressure * cone_volume<Dim>(p);
   });
+  for_each_turned(
+      x, [&](const CurvedLoadedFacet&, double pressure, const TurnedPoint& point) { sum += pressure * point.volume(); });
   return scale_ * sum;
 }
 
@@ -177,6 +241,9 @@ void PressureEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, W
     const Corners forces = scale_ * pressure * cone_gradient(p);
     for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
       gradient.segment<Dim>(Dim * facet.nodes[n]) += forces * weights.row(n).transpose();
+  });
+  for_each_turned(x, [&](const CurvedLoadedFacet& facet, double pressure, const TurnedPoint& point) {
+    add_by_nodes(facet, scale_ * pressure * point.gradient(), gradient);
   });
 }
 
@@ -197,6 +264,11 @@ void PressureEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
         by_nodes.template block<Dim, Dim>(Dim * k, Dim * n) = weights(n, k) * Mat<Dim>::Identity();
     const Mat<Dim* kNodes> of_nodes = by_nodes.transpose() * block * by_nodes;
     sink.add<Dim>(facet.nodes, of_nodes.data());
+  });
+  for_each_turned(x, [&](const CurvedLoadedFacet& facet, double pressure, const TurnedPoint& point) {
+    Mat<2 * kQuadraticNodes<1>> block = scale_ * pressure * point.hessian();
+    project_block(block, psd);
+    sink.add<2>(facet.nodes, block.data());
   });
 }
 

@@ -2,6 +2,7 @@
 // Follower pressure: forces -p n da on the deformed boundary. On a closed surface, or one whose rim is held, a constant p is
 // the gradient of p times the enclosed volume. What else there is (a free rim, a p that varies) has no potential: it is
 // lagged, so that the forces are exact at the positions where the term was made.
+// On facets that are turned about the axis V is pi times the integral of r^2 dz over the facet, and c that of its ends.
 #pragma once
 
 #include "energy/energy.hpp"
@@ -40,7 +41,12 @@ class PressureEnergy final : public Energy {
   template <typename F>
   void for_each_cone(ConstVectorView x, const F& f) const;
 
-  std::vector<LoadedFacet> facets_;
+  /// f(facet, pressure times the point's share, what is turned there) at points of all facets of an axisymmetric mesh.
+  template <typename F>
+  void for_each_turned(ConstVectorView x, const F& f) const;
+
+  bool axisymmetric_;
+  std::vector<LoadedFacet> facets_;  ///< straight ones, unless they are turned
   std::vector<CurvedLoadedFacet> curves_;
   Vec<Dim> origin_ = Vec<Dim>::Zero();  ///< near the facets: less round-off
   VectorX correction_;                  ///< sum of p c [N]

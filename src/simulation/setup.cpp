@@ -182,6 +182,10 @@ template <int Dim>
 void Setup<Dim>::validate() const {
   if (mesh.num_cells() == 0) refuse("mesh", "no cells", "at least one");
   StepSetup<Dim>::validate();
+  if (mesh.is_axisymmetric())
+    for (const VertexId v : mesh.live_vertices())
+      if (!(mesh.rest(v)[0] >= 0))
+        refuse("mesh", fmt::format("vertex {} at r = {:g} m", v, mesh.rest(v)[0]), "r >= 0 in an axisymmetric scene");
   check_materials(*this);
   check_proxy(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "energy/elastic/law_table.hpp"
 #include "itr/core.hpp"
 
 namespace itr {
@@ -35,6 +36,25 @@ constexpr Check<Dim> kChecks[] = {
      }},
     {{"terms", "terms of a program's own on quadratic elements"},
      [](const Setup<Dim>& setup, bool curves) { return (!setup.terms.empty() || setup.follower.forces) && curves; }},
+    {{"/axisymmetric", "remeshing of axisymmetric bodies with lumped mass, or by the paper's screening and sizing field"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && setup.mesh.is_axisymmetric() &&
+              (setup.lump_mass || setup.remesh.sizing_field.enabled ||
+               setup.remesh.screening == Screening::energy_percentile);
+     }},
+    {{"/materials", "a law of a program's own where axisymmetric bodies are remeshed"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.mesh.is_axisymmetric() && setup.remesh.enabled &&
+              std::ranges::any_of(setup.materials,
+                                  [](const auto& e) { return e.second.law == MaterialLaw::own && !sum_of(e.second); });
+     }},
+    {{"/materials", "plane stress, or invariants of a plane, in an axisymmetric scene"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.mesh.is_axisymmetric() && std::ranges::any_of(setup.materials, [](const auto& e) {
+                const LawSum* sum = sum_of(e.second);
+                return sum && (sum->is_plane_stress || sum->dimension == 2);
+              });
+     }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),

@@ -142,7 +142,7 @@ template <int Dim>
 void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale, int degree) {
   scale_ = scale;
   curved_.reset();
-  if (cells_.has_curved()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
+  if (!cells_.curved().empty()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
   by_body_.clear();
   by_element_.clear();
   bool varies = false;
