@@ -136,6 +136,15 @@ TEST(Axisymmetry, RodSwingsAlongItsAxis) {
   }
 }
 
+double axial_momentum(const Simulation<2>& simulation) {
+  const auto& state = simulation.state();
+  const auto& setup = simulation.setup();
+  VectorX product = VectorX::Zero(state.history.v[0].size());
+  InertiaEnergy<2>(whole_mesh(state.mesh, setup.obstacles.rest), setup.materials, MassKind::consistent, product)
+      .add_mass_product(state.history.v[0], product);
+  return axial_sum(product);
+}
+
 /// A disc falls on the ground and rebounds, with friction, remeshed: what the step keeps it keeps then, too.
 TEST(Axisymmetry, ADiscThatFallsIsRemeshedAndKeepsItsMass) {
   Scene setup = static_setup(mapped(4, [](double a, double b) { return Vec<2>(0.2 * a, 0.2 * b); }), 1);
@@ -152,13 +161,7 @@ TEST(Axisymmetry, ADiscThatFallsIsRemeshedAndKeepsItsMass) {
   setup.remesh.collapse.acceptance_tolerance = -1e-4;
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
-  const auto momentum = [&](const auto& state) {
-    VectorX product = VectorX::Zero(state.history.v[0].size());
-    InertiaEnergy<2>(whole_mesh(state.mesh, setup.obstacles.rest), setup.materials, MassKind::consistent, product)
-        .add_mass_product(state.history.v[0], product);
-    return axial_sum(product);
-  };
-  const double start = momentum(simulation.state());
+  const double start = axial_momentum(simulation);
   EXPECT_NEAR(start, -0.5 * 1000 * kPi * 0.04 * 0.2, 1e-9);
   int edits = 0;
   double last = start;
@@ -171,11 +174,42 @@ TEST(Axisymmetry, ADiscThatFallsIsRemeshedAndKeepsItsMass) {
       const double r = state.history.x[0][2 * v];
       EXPECT_TRUE(state.mesh.is_on_axis(v) ? r == 0 : r > 0) << v;
     }
-    last = momentum(state);
+    last = axial_momentum(simulation);
     if (result.report.energy.contact == 0 && state.step < 2) EXPECT_NEAR(last, start, 1e-9 * std::abs(start));
   }
   EXPECT_GT(edits, 5);
   EXPECT_GT(last, -0.3 * start);  // upwards
+}
+
+/// A disc that flies and swings, remeshed: its momentum along the axis stays what it was.
+TEST(Axisymmetry, RemeshingInFlightKeepsTheMomentumAlongTheAxis) {
+  for (const int order : {1, 2}) {
+    Scene setup = static_setup(mapped(4, [](double a, double b) { return Vec<2>(0.2 * a, 0.2 * b); }), order);
+    setup.materials[1] = {.youngs_modulus = 1e4, .poisson_ratio = 0.4, .density = 1000};
+    setup.time = {.integrator = Integrator::newmark, .dt = 0.005, .steps = 8};
+    setup.initial_velocity.push_back(
+        {1, [](const Vec<2>& X, double) { return Vec<2>(8 * X[0] * X[1], 1 + 20 * X[0] * X[0] - 30 * X[0] * X[1]); }});
+    setup.remesh.enabled = setup.remesh.swap.enabled = setup.remesh.smooth.enabled = true;
+    setup.remesh.split.acceptance_tolerance = 2e-3;
+    setup.remesh.collapse.acceptance_tolerance = -2e-3;
+    setup.remesh.collapse.rel_max_edge_length = 3;
+    setup.newton.force_tolerance = 1e-12;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    const double start = axial_momentum(simulation);
+    int edits = 0;
+    while (!simulation.finished()) {
+      const auto result = simulation.advance();
+      ASSERT_TRUE(result.ok) << result.reason;
+      const StepReport& r = result.report;
+      edits += r.splits.accepted + r.collapses.accepted + r.swaps.accepted + r.smooths.accepted;
+      EXPECT_NEAR(axial_momentum(simulation), start, 1e-9 * std::abs(start)) << "step " << simulation.state().step;
+      const auto& state = simulation.state();
+      for (int v = 0; v < state.mesh.num_nodes(); ++v)
+        if (state.mesh.is_on_axis(v)) EXPECT_EQ(state.history.v[0][2 * v], 0) << v;
+    }
+    EXPECT_GT(edits, 5);
+  }
 }
 
 using AxisymmetricScene = scene::SceneTest;
