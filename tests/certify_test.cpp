@@ -9,6 +9,7 @@
 
 #include "itr/core.hpp"
 #include "output/certify.hpp"
+#include "output/frame_file.hpp"
 #include "temporary_path.hpp"
 #include "written_scenes.hpp"
 
@@ -59,6 +60,19 @@ TEST_F(CertifyTest, FindsInvertedAndDegenerateCells) {
   const auto degenerate = violations_of(plane);
   ASSERT_FALSE(degenerate.empty());
   EXPECT_EQ(degenerate[0], "frames/000000.h5: cell 1 is degenerate");
+}
+
+TEST_F(CertifyTest, FindsWhatLeavesTheAxisAndWhatReachesIt) {
+  Plane plane;
+  plane.mesh.set_axisymmetric(true);
+  EXPECT_TRUE(violations_of(plane).empty());
+  EXPECT_TRUE(read_frame(folder / "frames" / "000000.h5").axisymmetric);
+  plane.x[0] = 0.01;
+  EXPECT_EQ(violations_of(plane), std::vector<std::string>{"frames/000000.h5: vertex 0 of R = 0 is at r = 0.01"});
+  for (int i = 0; i < plane.x.size(); i += 2) plane.x[i] = plane.mesh.rest(i / 2)[0] - 1;
+  const auto violations = violations_of(plane);
+  for (const char* text : {"vertex 0 of R = 0 is at r = -1", "vertex 1 of R = 1 is at r = 0"})
+    EXPECT_TRUE(std::ranges::count(violations, "frames/000000.h5: " + std::string(text))) << text;
 }
 
 TEST_F(CertifyTest, FindsBodiesThatTouch) {

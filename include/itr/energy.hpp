@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,23 +52,30 @@ struct CellSet {
     std::array<int, kQuadraticNodes<Dim - 1>> nodes() const { return joined(vertices, edge_nodes); }
   };
   int num_vertices = 0;           ///< length of fields / Dim; may exceed the cells' vertices (obstacles)
+  bool axisymmetric = false;      ///< positions are (r, z), and integrals go over the full turn
   std::vector<Vec<Dim>> rest;     ///< per local vertex
-  std::vector<Element> elements;  ///< those without curved edges first
+  std::vector<Element> elements;  ///< those without curved edges first; in any order where all are turned
   std::vector<BoundaryFacet> facets;
   std::shared_ptr<const VolumePatches<Dim>> patches{};  ///< null: all volumetric energies are taken at each point
 
-  /// The elements without curved edges, and those with at least one.
+  /// The elements with integrals in closed form, and those with integrals by quadrature: with curved edges, or turned.
   std::span<const Element> straight() const { return {elements.data(), num_straight()}; }
   std::span<const Element> curved() const { return std::span(elements).subspan(num_straight()); }
-  bool has_curved() const { return !elements.empty() && elements.back().curved; }
+  bool has_curved() const {
+    if (axisymmetric) return std::ranges::any_of(elements, [](const Element& element) { return element.curved != 0; });
+    return !elements.empty() && elements.back().curved;
+  }
   /// Adds an element in its place.
   void add(const Element& element) {
-    elements.insert(element.curved ? elements.end() : elements.begin() + static_cast<std::ptrdiff_t>(num_straight()),
-                    element);
+    const bool is_last = element.curved || axisymmetric;
+    elements.insert(is_last ? elements.end() : elements.begin() + static_cast<std::ptrdiff_t>(num_straight()), element);
   }
+  /// Length of the circle that a rest position is turned along [m]; 1 where nothing is turned.
+  double turn(const Vec<Dim>& X) const { return axisymmetric ? 2 * std::numbers::pi * X[0] : 1; }
 
  private:
   std::size_t num_straight() const {
+    if (axisymmetric) return 0;
     if (!has_curved()) return elements.size();
     const auto is_straight = [](const Element& element) { return element.curved == 0; };
     return static_cast<std::size_t>(std::partition_point(elements.begin(), elements.end(), is_straight) - elements.begin());

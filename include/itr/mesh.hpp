@@ -184,6 +184,18 @@ class ITR_EXPORT Mesh {
 
   /// Names the content: meshes of one revision are equal, a copy has that of the original, a change gives a new one.
   std::uint64_t revision() const { return revision_; }
+  /// Whether rest positions are (r, z) of bodies of revolution about r = 0 (docs/theory.md, "Axisymmetry"); 2D only.
+  bool is_axisymmetric() const { return is_axisymmetric_; }
+  void set_axisymmetric(bool is) requires(Dim == 2) {
+    is_axisymmetric_ = is;
+    renew_revision();
+  }
+  /// Whether the node lies on the axis of an axisymmetric mesh, where it has no radial displacement.
+  bool is_on_axis(VertexId node) const {
+    if (!is_axisymmetric_) return false;
+    const EdgeKey edge = edge_of_node(node);
+    return edge[0] == kNone ? rest_[node][0] == 0 : rest_[edge[0]][0] == 0 && rest_[edge[1]][0] == 0;
+  }
   int num_vertices() const { return num_vertices_; }  ///< alive ones; ids run to node_slots(), of a compact mesh to this
   int num_curved() const { return num_curved_; }      ///< edges that are curved
   int num_nodes() const { return num_vertices_ + num_curved_; }
@@ -321,6 +333,7 @@ class ITR_EXPORT Mesh {
 
   std::uint64_t revision_ = 0;  ///< of the mesh without anything
   int num_vertices_ = 0, num_cells_ = 0, num_facets_ = 0;
+  bool is_axisymmetric_ = false;
   std::vector<Vec<Dim>> rest_;
   std::vector<char> vertex_alive_;
   std::vector<int> vertex_tag_;

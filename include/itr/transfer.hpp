@@ -26,6 +26,7 @@ struct TransferMesh {
   /// Nodes and curved edges of cells, as those of a CellSet; both empty where no edge is curved.
   std::span<const std::array<int, kQuadraticNodes<Dim>>> nodes{};
   std::span<const CurvedEdges> curved{};
+  bool axisymmetric = false;  ///< integrals are weighted by 2 pi R, too (Mesh::is_axisymmetric)
 
   CurvedEdges curved_edges(std::size_t cell) const { return curved.empty() ? CurvedEdges{0} : curved[cell]; }
 };

@@ -26,7 +26,7 @@ double CavityLoad::stiffness_at(double ratio) const {
 
 template <int Dim>
 CavityEnergy<Dim>::CavityEnergy(const CellSet<Dim>& cells, CavityLoad load, double scale)
-    : load_(std::move(load)), scale_(scale) {
+    : cones_(cells.axisymmetric), load_(std::move(load)), scale_(scale) {
   Vec<Dim> middle = Vec<Dim>::Zero();
   for (const auto& facet : cells.facets) {
     if (std::ranges::find(load_.surfaces, facet.tag) == load_.surfaces.end()) continue;

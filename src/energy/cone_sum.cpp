@@ -68,6 +68,8 @@ double ConeSum<Dim>::add_value(ConstVectorView x, double sum) const {
   for (const Facet& facet : facets_) sum += facet.pressure * cone_volume<Dim>(corners(facet, x));
   for_each_cone(
       x, [&](const CurvedFacet&, double pressure, const auto&, const Corners& p) { sum += pressure * cone_volume<Dim>(p); });
+  for_each_turned(x,
+                  [&](const CurvedFacet&, double pressure, const TurnedPoint& point) { sum += pressure * point.volume(); });
   return sum;
 }
 
@@ -81,6 +83,9 @@ void ConeSum<Dim>::add_gradient(ConstVectorView x, double scale, VectorView grad
     const Corners forces = scale * pressure * cone_gradient(p);
     for (int n = 0; n < kQuadraticNodes<Dim - 1>; ++n)
       gradient.segment<Dim>(Dim * facet.nodes[n]) += forces * weights.row(n).transpose();
+  });
+  for_each_turned(x, [&](const CurvedFacet& facet, double pressure, const TurnedPoint& point) {
+    add_by_nodes(facet.nodes, scale * pressure * point.gradient(), gradient);
   });
 }
 
@@ -101,6 +106,11 @@ void ConeSum<Dim>::add_hessian(ConstVectorView x, double scale, PsdProjection ps
         by_nodes.template block<Dim, Dim>(Dim * k, Dim * n) = weights(n, k) * Mat<Dim>::Identity();
     const Mat<Dim* kNodes> of_nodes = by_nodes.transpose() * block * by_nodes;
     sink.add<Dim>(facet.nodes, of_nodes.data());
+  });
+  for_each_turned(x, [&](const CurvedFacet& facet, double pressure, const TurnedPoint& point) {
+    Mat<2 * kQuadraticNodes<1>> block = scale * pressure * point.hessian();
+    project_block(block, psd);
+    sink.add<2>(facet.nodes, block.data());
   });
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Volumes of cones from a fixed point to boundary facets, and their derivatives: what a pressure on the facets does.
+// Volumes of cones from a fixed point to boundary facets, and their derivatives: what a pressure on the facets does. A facet
+// that is turned about the axis has pi times the integral of r^2 dz over it instead.
 #pragma once
 
+#include <numbers>
 #include <vector>
 
 #include "energy/energy.hpp"
@@ -21,7 +23,46 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
 Mat<2> cone_gradient(const Mat<2>& corners);
 Mat<3> cone_gradient(const Mat<3>& corners);
 
-/// Sum over facets of a pressure times the signed volume of the cone from a fixed point.
+/// A point of an edge that is turned, with its shape functions and their derivatives along the edge.
+struct TurnedPoint {
+  using Nodal = Eigen::Matrix<double, 2, kQuadraticNodes<1>>;
+  Vec<kQuadraticNodes<1>> shapes, slopes;
+  double r, dr, dz;  ///< radius, and derivatives of the position along the edge
+
+  TurnedPoint(CurvedEdges curved, const std::array<double, 2>& l, const Nodal& x)
+      : shapes(quadratic_shapes<1>(curved, l)),
+        slopes(quadratic_gradients<1, 1>(curved, l, Eigen::RowVector2d(-1, 1)).transpose()),
+        r(x.row(0) * shapes),
+        dr(x.row(0) * slopes),
+        dz(x.row(1) * slopes) {}
+
+  double volume() const { return std::numbers::pi * r * r * dz; }
+  Nodal gradient() const {
+    Nodal g;
+    g.row(0) = 2 * std::numbers::pi * r * dz * shapes.transpose();
+    g.row(1) = std::numbers::pi * r * r * slopes.transpose();
+    return g;
+  }
+  /// Area times normal, shared by shape functions.
+  Nodal normal() const { return 2 * std::numbers::pi * r * Vec<2>(dz, -dr) * shapes.transpose(); }
+  Mat<2 * kQuadraticNodes<1>> hessian() const {
+    Mat<2 * kQuadraticNodes<1>> H = Mat<2 * kQuadraticNodes<1>>::Zero();
+    for (int a = 0; a < kQuadraticNodes<1>; ++a)
+      for (int b = 0; b < kQuadraticNodes<1>; ++b) {
+        H(2 * a, 2 * b) = 2 * std::numbers::pi * dz * shapes[a] * shapes[b];
+        H(2 * a, 2 * b + 1) = H(2 * b + 1, 2 * a) = 2 * std::numbers::pi * r * shapes[a] * slopes[b];
+      }
+    return H;
+  }
+};
+
+/// Adds the columns to the entries of a facet's nodes; at a straight edge the last column is zero.
+template <std::size_t N, typename Forces>
+void add_by_nodes(const std::array<int, N>& nodes, const Forces& forces, auto&& sum) {
+  for (std::size_t n = 0; n < N; ++n) sum.template segment<2>(2 * nodes[n]) += forces.col(static_cast<Eigen::Index>(n));
+}
+
+/// Sum over facets of a pressure times the signed volume of the cone from a fixed point, or of what is turned.
 template <int Dim>
 class ConeSum {
  public:
@@ -36,8 +77,9 @@ class ConeSum {
     double pressure;
   };
 
+  explicit ConeSum(bool axisymmetric) : axisymmetric_(axisymmetric) {}
   void add(const typename CellSet<Dim>::BoundaryFacet& facet, double pressure) {
-    if (facet.curved)
+    if (facet.curved || axisymmetric_)
       curves_.push_back({facet.nodes(), facet.curved, pressure});
     else
       facets_.push_back({facet.vertices, pressure});
@@ -46,7 +88,7 @@ class ConeSum {
   void set_origin(const Vec<Dim>& origin) { origin_ = origin; }
   bool empty() const { return facets_.empty() && curves_.empty(); }
   std::size_t size() const { return facets_.size() + curves_.size(); }
-  const std::vector<Facet>& facets() const { return facets_; }
+  const std::vector<Facet>& facets() const { return facets_; }  ///< straight ones, unless they are turned
 
   /// `sum` plus the volumes times their pressures.
   double add_value(ConstVectorView x, double sum) const;
@@ -58,9 +100,11 @@ class ConeSum {
     for (int k = 0; k < Dim; ++k) p.col(k) = x.segment<Dim>(Dim * facet.vertices[k]) - origin_;
     return p;
   }
-  /// f(facet, pressure times the point's share, weights of its nodes, corners of the cone) at points of all curved facets.
+  /// f(facet, pressure times the point's share, weights of its nodes, corners of the cone) at points of all curved facets,
+  /// unless they are turned.
   template <typename F>
   void for_each_cone(ConstVectorView x, const F& f) const {
+    if (axisymmetric_) return;
     constexpr int kDegree = Dim == 2 ? 3 : 4;  // of det(x, t1, t2), and of a shape function times the normal
     for (const CurvedFacet& facet : curves_) {
       auto nodes = at_nodes<Dim>(facet.nodes, x);
@@ -71,8 +115,20 @@ class ConeSum {
       }
     }
   }
+  /// f(facet, pressure times the point's share, what is turned there) at points of all facets of an axisymmetric mesh.
+  template <typename F>
+  void for_each_turned(ConstVectorView x, const F& f) const {
+    if constexpr (Dim == 2) {
+      constexpr int kDegree = 5;  // of r^2 dz
+      if (!axisymmetric_) return;
+      for (const CurvedFacet& facet : curves_)
+        for (const auto& point : quadrature<1>(kDegree))
+          f(facet, facet.pressure * point.fraction, TurnedPoint(facet.curved, point.weights, at_nodes<2>(facet.nodes, x)));
+    }
+  }
 
  private:
+  bool axisymmetric_;
   std::vector<Facet> facets_;
   std::vector<CurvedFacet> curves_;
   Vec<Dim> origin_ = Vec<Dim>::Zero();

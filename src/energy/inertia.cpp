@@ -13,6 +13,19 @@ constexpr std::size_t kBlock = 256;
 struct FromPredictor {
   ScratchVector distance;
 };
+
+/// The mass matrix of a cell by unit of its volume, with a density that varies and the turn.
+template <int Dim, typename Density>
+Mat<kQuadraticNodes<Dim>> varying_mass(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
+                                       MassKind kind, const Density& density) {
+  const int degree = degree_with_turn(kMassDegree, cells.axisymmetric);
+  std::vector<double> densities;
+  for (const auto& point : quadrature<Dim>(degree)) {
+    const Vec<Dim> X = rest_position<Dim>(cells, element, point.weights);
+    densities.push_back(density(X) * cells.turn(X));
+  }
+  return quadratic_mass<Dim>(kind, element.curved, densities, degree);
+}
 }  // namespace
 
 template <int Dim>
@@ -45,12 +58,10 @@ void InertiaEnergy<Dim>::renew_curved(const std::map<int, Material>& materials) 
   matrix_of.fill(kAbsent);
   for (const auto& element : cells_.curved()) {
     const Material& material = materials.at(element.body);
-    if (material.density_at) {
-      std::vector<double> density;
-      for (const auto& point : quadrature<Dim>(kMassDegree))
-        density.push_back(mass_density<Dim>(material, rest_position<Dim>(cells_, element, point.weights)));
+    if (material.density_at || cells_.axisymmetric) {
+      const auto density = [&](const Vec<Dim>& X) { return mass_density<Dim>(material, X); };
       curved_mass_.push_back({element.volume, matrices_.size()});
-      matrices_.push_back(quadratic_mass<Dim>(kind_, element.curved, density));
+      matrices_.push_back(varying_mass<Dim>(cells_, element, kind_, density));
       continue;
     }
     std::size_t& matrix = matrix_of[element.curved];
@@ -162,7 +173,9 @@ void get_unit_mass_diagonal(const CellSet<Dim>& cells, VectorView diagonal) {
     for (const int v : element.vertices)
       diagonal.segment<Dim>(Dim * v).array() += 2 * element.volume / ((Dim + 1) * (Dim + 2));
   for (const auto& element : cells.curved()) {
-    const auto mass = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal();
+    const auto one = [](const Vec<Dim>&) { return 1.0; };
+    Vec<kQuadraticNodes<Dim>> mass = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).diagonal();
+    if (cells.axisymmetric) mass = varying_mass<Dim>(cells, element, MassKind::consistent, one).diagonal();
     const auto nodes = element.nodes();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k) diagonal.segment<Dim>(Dim * nodes[k]).array() += element.volume * mass[k];
   }

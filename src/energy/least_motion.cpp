@@ -125,7 +125,10 @@ LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, c
     Eigen::AlignedBox<double, Dim> box;
     for (const int node : part.nodes) box.extend(Vec<Dim>(x.segment<Dim>(Dim * node)));
     part.size = box.diagonal().norm();
-    if (!has_free_motion<Dim>(part.nodes, x, held, centres[p], part.size / 2)) continue;
+    const bool is_loose = cells.axisymmetric  // only a motion along the axis is rigid
+                              ? std::ranges::none_of(part.nodes, [&](int node) { return held[Dim * node + 1] != 0; })
+                              : has_free_motion<Dim>(part.nodes, x, held, centres[p], part.size / 2);
+    if (!is_loose) continue;
     part.modulus *= std::pow(part.size, Dim - 2);
     number[p] = static_cast<int>(loose.size());
     loose.push_back(std::move(part));
@@ -181,6 +184,7 @@ MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) c
     Motions rows = rigid_modes(Vec<Dim>(x.segment<Dim>(Dim * node) - centres[part]), loose_.parts[part].size / 2);
     for (int c = 0; c < Dim; ++c)
       if (dofs.unknown[Dim * node + c] == kNone) rows.row(c).setZero();
+    if (cells_.axisymmetric) rows.row(0).setZero(), rows.template rightCols<kModes - Dim>().setZero();
     return rows;
   };
   std::vector<Mat<kModes>> gram(loose_.parts.size(), Mat<kModes>(Mat<kModes>::Zero()));

@@ -17,12 +17,13 @@ std::array<Vec<Dim>, Vertices> rest_of(const std::array<int, Vertices>& vertices
 }
 
 /// Adds the forces of a load times a density on a cell or a facet: with curved edges by the rule for products of two
-/// quadratic functions, without them by the points of linear ones, of the density in the middle.
+/// quadratic functions, without them by the points of linear ones, of the density in the middle. Turned ones take the first,
+/// one degree higher.
 template <int Dim, int SimplexDim, typename Simplex>
 void add_forces(const Simplex& simplex, const CellSet<Dim>& cells, double measure, const auto& density,
                 const std::function<Vec<Dim>(const RestPoint<Dim>&)>& load, VectorView forces) {
   const auto rest = rest_of(simplex.vertices, cells);
-  if (!simplex.curved) {
+  if (!simplex.curved && !cells.axisymmetric) {
     using Point = LoadPoint<SimplexDim + 1>;
     Vec<Dim> sum = Vec<Dim>::Zero();
     for (const Vec<Dim>& X : rest) sum += X;
@@ -36,10 +37,10 @@ void add_forces(const Simplex& simplex, const CellSet<Dim>& cells, double measur
   Vec<Dim> inward = Vec<Dim>::Zero();
   if constexpr (SimplexDim < Dim) inward = inward_normal(rest);
   const auto nodes = simplex.nodes();
-  for (const auto& point : quadrature<SimplexDim>(kMassDegree)) {
+  for (const auto& point : quadrature<SimplexDim>(degree_with_turn(kMassDegree, cells.axisymmetric))) {
     Vec<Dim> X = Vec<Dim>::Zero();
     for (int k = 0; k <= SimplexDim; ++k) X += point.weights[k] * rest[k];
-    const Vec<Dim> f = point.fraction * measure * density(X) * load(RestPoint<Dim>(X, inward, simplex.part));
+    const Vec<Dim> f = point.fraction * measure * density(X) * cells.turn(X) * load(RestPoint<Dim>(X, inward, simplex.part));
     const auto shapes = quadratic_shapes<SimplexDim>(simplex.curved, point.weights);
     for (int k = 0; k < kQuadraticNodes<SimplexDim>; ++k) forces.segment<Dim>(Dim * nodes[k]) += shapes[k] * f;
   }

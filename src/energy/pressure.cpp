@@ -35,7 +35,7 @@ RestPoint<Dim> middle_of(const std::array<int, Dim>& nodes, int part, const Cell
 template <int Dim>
 PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>& loads, ConstVectorView lagged_x,
                                     double scale)
-    : correction_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
+    : cones_(cells.axisymmetric), correction_(VectorX::Zero(Dim * cells.num_vertices)), scale_(scale) {
   Vec<Dim> origin = Vec<Dim>::Zero();
   for (const bool is_curved : {false, true})
     for (const auto& facet : cells.facets)
@@ -55,6 +55,11 @@ PressureEnergy<Dim>::PressureEnergy(const CellSet<Dim>& cells, const Loads<Dim>&
     for (int k = 0; k < Dim; ++k)
       correction_.segment<Dim>(Dim * facet.vertices[k]) += facet.pressure * (fraction - gradient.col(k));
   }
+  cones_.for_each_turned(lagged_x, [&](const auto& facet, double pressure, const TurnedPoint& point) {
+    const TurnedPoint::Nodal normal = pressure * point.normal();
+    largest_force_ = std::max(largest_force_, normal.norm());
+    add_by_nodes(facet.nodes, normal - pressure * point.gradient(), correction_);
+  });
   cones_.for_each_cone(lagged_x, [&](const auto& facet, double pressure, const auto& weights, const Mat<Dim>& p) {
     const Mat<Dim> gradient = cone_gradient(p);
     const Vec<Dim> normal = Dim * corner_fraction(p);

@@ -2,6 +2,7 @@
 // Follower pressure: forces -p n da on the deformed boundary. On a closed surface, or one whose rim is held, a constant p is
 // the gradient of p times the enclosed volume. What else there is (a free rim, a p that varies) has no potential: it is
 // lagged, so that the forces are exact at the positions where the term was made.
+// On facets that are turned about the axis V is pi times the integral of r^2 dz over the facet, and c that of its ends.
 #pragma once
 
 #include "energy/cone_sum.hpp"

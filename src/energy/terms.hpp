@@ -26,6 +26,7 @@ struct PotentialTerms {
   std::map<int, Material> materials;  ///< by body
   Loads<Dim> loads;                   ///< at the end of the step
   bool has_inertia = true;
+  bool axisymmetric = false;  ///< CellSet::axisymmetric of all cells
   MassKind mass = MassKind::consistent;
   int quadrature_degree = kElasticDegree;  ///< of elasticity on curved elements
   double scaling = 1;                      ///< alpha h^2 [s^2]
@@ -229,7 +230,8 @@ bool any_term(const PotentialTerms<Dim>& terms, const F& f) {
 /// Whether predictions of gains know of all terms that act.
 template <int Dim>
 bool is_predictable(const PotentialTerms<Dim>& terms) {
-  return !any_term(terms, [](const TermTraits<Dim>& term) { return term.in_predictions == InPredictions::unknown; });
+  return !terms.axisymmetric &&  // of which CellModel knows nothing
+         !any_term(terms, [](const TermTraits<Dim>& term) { return term.in_predictions == InPredictions::unknown; });
 }
 
 /// Whether all terms that act are known to be never negative, constants aside.

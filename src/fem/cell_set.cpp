@@ -6,13 +6,14 @@ namespace itr {
 template <int Dim>
 CellSet<Dim> whole_mesh(const Mesh<Dim>& mesh, const std::vector<Vec<Dim>>& extra) {
   CellSet<Dim> set;
+  set.axisymmetric = mesh.is_axisymmetric();
   set.rest = mesh.rest();
   set.rest.insert(set.rest.end(), extra.begin(), extra.end());
   set.num_vertices = static_cast<int>(set.rest.size());
   std::vector<typename CellSet<Dim>::Element> curved;
   for (const CellId c : mesh.live_cells()) {
     const auto element = element_of(mesh, c);
-    (element.curved ? curved : set.elements).push_back(element);
+    (element.curved && !set.axisymmetric ? curved : set.elements).push_back(element);
   }
   set.elements.insert(set.elements.end(), curved.begin(), curved.end());
   for (const FacetId f : mesh.live_facets()) {

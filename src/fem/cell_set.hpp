@@ -130,7 +130,8 @@ template <int Dim>
 typename CellSet<Dim>::Element element_of(const Mesh<Dim>& mesh, CellId c) {
   typename CellSet<Dim>::Element element{
       mesh.cell(c), mesh.body(c), mesh.volume(c), mesh.inverse_rest_edges(c), mesh.part(c), c};
-  if (mesh.has_nodes()) element.curved = find_edge_nodes<Dim>(mesh.cell(c), nodes_of_edges(mesh), element.edge_nodes);
+  if (mesh.has_nodes() || mesh.is_axisymmetric())
+    element.curved = find_edge_nodes<Dim>(mesh.cell(c), nodes_of_edges(mesh), element.edge_nodes);
   return element;
 }
 /// Deformation gradient of an element without curved edges at interleaved positions x.

@@ -16,6 +16,12 @@ class Displacement {
   Displacement(const std::vector<Vec<Dim>>& rest, ConstVectorView base, ConstVectorView d)
       : rest_(rest.data()), x_(base.data()), d_(d.data()) {}
 
+  Vec<Dim> of(int a) const {
+    using Column = Eigen::Map<const Vec<Dim>>;
+    Vec<Dim> displacement = Column(x_ + Dim * a) - rest_[a];
+    if (d_) displacement += Column(d_ + Dim * a);
+    return displacement;
+  }
   /// u_b - u_a
   Vec<Dim> difference(int a, int b) const {
     using Column = Eigen::Map<const Vec<Dim>>;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <numbers>
 #include <span>
+#include <vector>
 
 #include "fem/quadratic.hpp"
 #include "fem/quadrature.hpp"
@@ -40,12 +42,13 @@ struct ElementMass {
 };
 
 /// Mass by unit mass of a simplex with curved edges. Lumped: the consistent diagonal, scaled to the simplex' mass (Hinton,
-/// Rock and Zienkiewicz 1976), since row sums are negative at vertices in 3D. `density` is relative, by mass quadrature
-/// point; empty: constant.
+/// Rock and Zienkiewicz 1976), since row sums are negative at vertices in 3D. `density` is relative, by point of the
+/// quadrature of `degree`; empty: constant.
 template <int Dim>
-Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std::span<const double> density = {}) {
+Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std::span<const double> density = {},
+                                         int degree = kMassDegree) {
   Mat<kQuadraticNodes<Dim>> mass = Mat<kQuadraticNodes<Dim>>::Zero();
-  const auto& rule = quadrature<Dim>(kMassDegree);
+  const auto& rule = quadrature<Dim>(degree);
   double total = 0;
   for (std::size_t q = 0; q < rule.size(); ++q) {
     const double weight = rule[q].fraction * (density.empty() ? 1 : density[q]);
@@ -56,6 +59,19 @@ Mat<kQuadraticNodes<Dim>> quadratic_mass(MassKind kind, CurvedEdges curved, std:
   if (kind == MassKind::consistent) return mass;
   const Vec<kQuadraticNodes<Dim>> diagonal = mass.diagonal();
   return Mat<kQuadraticNodes<Dim>>((total / diagonal.sum() * diagonal).asDiagonal());
+}
+
+/// Mass by unit of density and of volume of a simplex with these corners that is turned about the axis (CellSet::turn).
+template <int Dim>
+Mat<kQuadraticNodes<Dim>> turned_mass(MassKind kind, CurvedEdges curved, const std::array<Vec<Dim>, Dim + 1>& corners) {
+  const int degree = degree_with_turn(kMassDegree, true);
+  std::vector<double> turns;
+  for (const auto& point : quadrature<Dim>(degree)) {
+    double R = 0;
+    for (int k = 0; k <= Dim; ++k) R += point.weights[k] * corners[k][0];
+    turns.push_back(2 * std::numbers::pi * R);
+  }
+  return quadratic_mass<Dim>(kind, curved, turns, degree);
 }
 
 /// Mass matrix of constant density, integrated once in a program.

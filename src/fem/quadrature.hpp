@@ -2,6 +2,7 @@
 // Quadrature on simplices: points in barycentric coordinates, positive weights of sum 1.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -33,5 +34,10 @@ const std::vector<QuadraturePoint<Dim>>& cell_quadrature(int level, int degree) 
 }
 
 inline constexpr int kMassDegree = 4;  ///< products of two quadratic functions
+
+/// The degree of a rule of `degree` for integrands times the radius, where cells are turned about an axis.
+inline int degree_with_turn(int degree, bool is_turned) {
+  return is_turned ? std::min(degree + 1, kMostQuadratureDegree) : degree;
+}
 
 }  // namespace itr

@@ -94,6 +94,7 @@ Mesh<Dim> refine_uniformly(const Mesh<Dim>& mesh) {
   for (const auto& [facet, tag] : tagged) refined.set_facet_tag(refined.find_facet(facet), tag);
   for (VertexId v = 0; v < mesh.num_vertices(); ++v) refined.set_vertex_tag(v, mesh.vertex_tag(v));
   for (const EdgeKey& edge : mesh.edges()) refined.set_vertex_tag(mid(edge[0], edge[1]), mesh.edge_tag(edge));
+  if constexpr (Dim == 2) refined.set_axisymmetric(mesh.is_axisymmetric());
   return refined;
 }
 

@@ -62,6 +62,32 @@ void check_cells(const StoredFrame& frame, const std::vector<double>& coordinate
   }
 }
 
+/// Sign of a + b + c, exact.
+int sign_of_sum(double a, double b, double c) {
+  const double sum = a + b, rest = sum - a, error = (a - (sum - rest)) + (b - rest);  // Knuth: sum + error = a + b
+  const double total = sum + c;                                                       // c cancels only what is near it
+  if (total == 0 || std::abs(total) < std::abs(sum) / 2) return (total > -error) - (total < -error);
+  return (total > 0) - (total < 0);
+}
+
+/// Bodies of revolution: nodes on the axis at rest stay there, the radius is positive everywhere else.
+void check_axis(const StoredFrame& frame, const std::string& name, std::vector<Violation>& violations) {
+  const auto rest = points<2>(frame.rest), x = points<2>(frame.x);
+  const std::size_t vertices = x.size() - frame.curved_edges.size() / 2;
+  for (std::size_t v = 0; v < vertices; ++v)
+    if (!(rest[v][0] > 0 ? x[v][0] > 0 : rest[v][0] == 0 && x[v][0] == 0))
+      violations.push_back(
+          {Of::cells, fmt::format("{}: vertex {} of R = {:g} is at r = {:g}", name, v, rest[v][0], x[v][0])});
+  for (std::size_t e = 0; e < frame.curved_edges.size() / 2; ++e) {
+    const auto a = static_cast<std::size_t>(frame.curved_edges[2 * e]),
+               b = static_cast<std::size_t>(frame.curved_edges[2 * e + 1]);
+    const bool is_on_axis = rest[a][0] == 0 && rest[b][0] == 0;
+    const int sign = sign_of_sum(4 * x[vertices + e][0], -x[a][0], -x[b][0]);  // of the edge's middle Bernstein coefficient
+    if (is_on_axis ? x[vertices + e][0] != 0 : sign <= 0)
+      violations.push_back({Of::cells, fmt::format("{}: the edge of vertices {} and {} reaches the axis", name, a, b)});
+  }
+}
+
 /// Whether an edge and a triangle with one common vertex lie on each other: in one plane, and the edge within the triangle's
 /// angle at that vertex. Exact.
 bool is_folded(const FrameSurface<3>& surface, const std::array<int, 2>& edge, const std::array<int, 3>& triangle) {
@@ -209,6 +235,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   const std::size_t before = violations.size();
   check_cells<Dim>(frame, frame.rest, "at rest ", name, violations);
   check_cells<Dim>(frame, frame.x, "", name, violations);
+  if (frame.axisymmetric) check_axis(frame, name, violations);
   const FrameSurface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   Patches<Dim> curves;

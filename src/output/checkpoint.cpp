@@ -102,6 +102,7 @@ Mesh<Dim> read_mesh(const fs::path& path, const hdf5::File& file) {
     throw InputError({path.string(), "/mesh", "lists of different lengths", "one entry for every cell and facet"});
   Mesh<Dim> mesh(std::move(points), std::move(cells), std::move(body));
   mesh.set_facets(facets, tags);
+  if constexpr (Dim == 2) mesh.set_axisymmetric(file.contains(kAxisymmetric));
   if (file.contains(kStepsApart)) {
     const auto steps = read_ints(path, file, kStepsApart);
     if (static_cast<int>(steps.size()) != mesh.num_vertices())

@@ -74,6 +74,7 @@ void write_mesh(const Target& target, const Mesh<Dim>& mesh, ConstVectorView res
   file.write("/mesh/simplices", simplices, Dim + 1);
   file.write("/mesh/body", body, 0);
   file.write("/mesh/surface", surface, Dim);
+  if (mesh.is_axisymmetric()) file.write(kAxisymmetric, std::array{std::int64_t{1}}, 0);
 }
 
 /// For how many steps vertices have been apart from what coincides with them at rest; nothing where none does.
@@ -220,7 +221,7 @@ void fill(hdf5::File& file, const FrameView<Dim>& frame, int step, double t, con
   target.write("/fields/x", as_span(frame.x), Dim, "m");
   target.write("/fields/u", as_span(u), Dim, "m");
   target.write("/fields/v", as_span(frame.v), Dim, "m/s");
-  target.write("/fields/elastic_density", frame.elastic_density, 0, Dim == 2 ? "J/m^2" : "J/m^3");
+  target.write("/fields/elastic_density", frame.elastic_density, 0, Dim == 2 && !mesh.is_axisymmetric() ? "J/m^2" : "J/m^3");
   if (frame.asked) write_asked<Dim>(target, *frame.asked);
   write_surface<Dim>(target, "/obstacles", frame.obstacle_x, frame.obstacle_edges, frame.obstacle_triangles);
   if (frame.proxy.x) write_surface<Dim>(target, "/proxy", *frame.proxy.x, *frame.proxy.edges, *frame.proxy.triangles);
@@ -342,7 +343,7 @@ FrameTotals read_frame_totals(const std::filesystem::path& path) {
   const hdf5::Session session;
   const hdf5::File file = hdf5::File::open(path);
   FrameTotals totals{step_of_frame(path), read_units(path, file), file.read_double_attribute("t"), {}, {}};
-  totals.units.dim = file.shape("/fields/x").columns;
+  totals.units.dim = file.contains(kAxisymmetric) ? 3 : file.shape("/fields/x").columns;
   if (const char* name = "/totals/kinetic_energy"; file.contains(name)) {
     const auto values = file.read_doubles(name).values;
     if (values.size() != 1) throw InputError({path.string(), name, std::to_string(values.size()) + " numbers", "1"});
@@ -403,7 +404,8 @@ StoredFrame read_frame(const std::filesystem::path& path) {
   if (x.columns != 2 && x.columns != 3) require_shape(path, "/fields/x", x.columns, 2);
   frame.dim = x.columns;
   frame.units = read_units(path, file);
-  frame.units.dim = frame.dim;
+  frame.axisymmetric = file.contains(kAxisymmetric);
+  frame.units.dim = frame.axisymmetric ? 3 : frame.dim;
   frame.simplices = read_indices(path, file, "/mesh/simplices", frame.dim + 1, x.rows());
   frame.body = file.read_integers("/mesh/body").values;
   if (const std::size_t cells = frame.simplices.size() / (frame.dim + 1); frame.body.size() != cells)

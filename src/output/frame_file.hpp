@@ -46,6 +46,7 @@ int step_of_frame(const std::filesystem::path& path);
 
 /// Mesh::steps_apart by vertex; only where faces coincide at rest.
 constexpr const char* kStepsApart = "/mesh/steps_apart";
+constexpr const char* kAxisymmetric = "/mesh/axisymmetric";  ///< there, and 1, in frames of axisymmetric scenes
 
 /// Datasets of /fields that only a scene which asks for them has.
 constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reaction_force", "von_mises", "stress"};
@@ -84,6 +85,7 @@ struct StoredSurface {
 /// Part of a stored frame that a certificate or a comparison needs. Indices are checked: all within range.
 struct StoredFrame {
   int dim = 0;
+  bool axisymmetric = false;
   Units units;                          ///< of all numbers here; below they are named as of SI units
   std::vector<double> rest;             ///< n x dim, row-major [m]: vertices, then nodes of curved edges
   std::vector<double> x;                ///< n x dim, row-major [m]

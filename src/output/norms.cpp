@@ -8,6 +8,7 @@
 #include "fem/quadrature.hpp"
 #include "geometry/measures.hpp"
 #include "itr/output.hpp"
+#include "mesh/turn.hpp"
 
 namespace itr::output {
 
@@ -32,7 +33,8 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
         u[k] = vertex_of<Dim>(x, element.vertices[k]) - mesh.rest(element.vertices[k]);
         mean += u[k] / (Dim + 1);
       }
-      add(element.volume, mean.norm(), (edge_matrix<Dim>(u) * element.inverse_edges).norm());
+      add(element.volume * turn_at(mesh, mesh.barycenter(c)), mean.norm(),
+          (edge_matrix<Dim>(u) * element.inverse_edges).norm());
       continue;
     }
     const auto positions = at_nodes<Dim>(element.nodes(), x);
@@ -41,7 +43,7 @@ DisplacementNorms displacement_norms(const Mesh<Dim>& mesh, ConstVectorView x) {
       for (int k = 0; k <= Dim; ++k) X += point.weights[k] * mesh.rest(element.vertices[k]);
       const Vec<Dim> u = positions * quadratic_shapes<Dim>(element.curved, point.weights) - X;
       const Mat<Dim> F = positions * shape_gradients<Dim>(element, point.weights).transpose();
-      add(point.fraction * element.volume, u.norm(), (F - Mat<Dim>::Identity()).norm());
+      add(point.fraction * element.volume * turn_at(mesh, X), u.norm(), (F - Mat<Dim>::Identity()).norm());
     }
   }
   norms.l2 = std::sqrt(l2_squared);

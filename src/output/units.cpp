@@ -19,7 +19,8 @@ std::vector<ForceCurvePoint> in_units(std::vector<ForceCurvePoint> curves, const
   const double force = units.factor("N"), moment = units.factor("N m");
   for (ForceCurvePoint& curve : curves) {
     const auto convert = [&](std::vector<double>& kind) {
-      for (std::size_t i = 0; i < kind.size(); ++i) kind[i] /= i < static_cast<std::size_t>(units.dim) ? force : moment;
+      const std::size_t components = kind.size() == 3 ? 2 : 3;  // then those of the moment, 1 in 2D
+      for (std::size_t i = 0; i < kind.size(); ++i) kind[i] /= i < components ? force : moment;
     };
     for (auto& kind : curve.kinds) convert(kind);
     if (!curve.cavity.empty()) {

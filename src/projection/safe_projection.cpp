@@ -117,7 +117,13 @@ std::vector<Integral> integrals_of(const SafeProjectionProblem<Dim>& problem, co
     for (const int v : element.vertices)
       masses[v] += problem.materials.at(element.body).density * element.volume / (Dim + 1);
   for (const auto& element : problem.cells.curved()) {
-    const auto fractions = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved).rowwise().sum().eval();
+    Mat<kQuadraticNodes<Dim>> unit = constant_quadratic_mass<Dim>(MassKind::consistent, element.curved);
+    if (problem.cells.axisymmetric) {
+      std::array<Vec<Dim>, Dim + 1> corners;
+      for (int k = 0; k <= Dim; ++k) corners[k] = problem.cells.rest[element.vertices[k]];
+      unit = turned_mass<Dim>(MassKind::consistent, element.curved, corners);
+    }
+    const auto fractions = unit.rowwise().sum().eval();
     const auto nodes = element.nodes();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)  // 0 at straight edges
       masses[nodes[k]] += problem.materials.at(element.body).density * element.volume * fractions[k];
@@ -267,7 +273,7 @@ VectorX project_safely(const SafeProjectionProblem<Dim>& problem, const VectorX&
   const double whole = distance->value(interpolant, workspace);
   energy.add(distance);
   energy.add(barriers.volume);
-  if (problem.cells.has_curved()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
+  if (!problem.cells.curved().empty()) energy.add(std::make_shared<InversionGuard<Dim>>(barriers.inversion));
   if (barriers.distance) energy.add(barriers.distance);
   SparseSystem sparse(solver);
   sparse.reset(dofs, Dim, element_stencils(problem.cells));

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "core/connected_parts.hpp"
@@ -38,6 +39,20 @@ double cell_mass(const TransferMesh<Dim>& mesh, int cell) {
   return mesh.density[cell] * simplex_volume<Dim>(corners<Dim>(mesh, cell));
 }
 
+/// The consistent or lumped mass matrix of a cell by unit mass, in an axisymmetric mesh with the turn.
+template <int Dim>
+Mat<kQuadraticNodes<Dim>> unit_mass(const TransferMesh<Dim>& mesh, std::size_t cell, MassKind kind) {
+  const CurvedEdges curved = mesh.curved_edges(cell);
+  if (mesh.axisymmetric) return turned_mass<Dim>(kind, curved, corners<Dim>(mesh, static_cast<int>(cell)));
+  return constant_quadratic_mass<Dim>(kind, curved);
+}
+
+/// A vertex, or the node of a curved edge.
+template <int Dim>
+int node_of(const TransferMesh<Dim>& mesh, std::size_t cell, int i) {
+  return i <= Dim ? mesh.cells[cell][static_cast<std::size_t>(i)] : mesh.nodes[cell][static_cast<std::size_t>(i)];
+}
+
 /// Shape functions of all nodes of a cell at barycentric coordinates.
 template <int Dim>
 Vec<kQuadraticNodes<Dim>> shapes_at(CurvedEdges curved, const Vec<Dim + 1>& weights) {
@@ -65,21 +80,25 @@ void add_curved_difference(const TransferMesh<Dim>& old_mesh, int old_cell, cons
   const CurvedEdges old_curved = old_mesh.curved_edges(old_cell), new_curved = new_mesh.curved_edges(new_cell);
   const double density = old_mesh.density[old_cell];
   for (const OverlapPiece<Dim>& piece : pieces)
-    for (const auto& point : quadrature<Dim>(kMassDegree)) {
+    for (const auto& point : quadrature<Dim>(degree_with_turn(kMassDegree, old_mesh.axisymmetric))) {
       Vec<Dim + 1> in_new = Vec<Dim + 1>::Zero(), in_old = in_new;
       for (int k = 0; k <= Dim; ++k) {
         in_new += point.weights[k] * piece.in_a[k];
         in_old += point.weights[k] * piece.in_b[k];
       }
       const auto new_shapes = shapes_at<Dim>(new_curved, in_new), old_shapes = shapes_at<Dim>(old_curved, in_old);
-      const double weight = density * point.fraction * piece.volume;
+      double weight = density * point.fraction * piece.volume;
+      if (old_mesh.axisymmetric) {
+        double R = 0;
+        for (int k = 0; k <= Dim; ++k) R += in_old[k] * old_mesh.rest[old_mesh.cells[old_cell][k]][0];
+        weight *= 2 * std::numbers::pi * R;
+      }
       for (Eigen::Index column = 0; column < u_old.cols(); ++column) {
         const double gap = old_shapes.dot(values_in<Dim>(old_mesh, old_cell, u_old, column)) -
                            new_shapes.dot(values_in<Dim>(new_mesh, new_cell, u_bar, column));
         for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
           if (has_node<Dim>(new_curved, i))
-            difference.residual(i <= Dim ? new_mesh.cells[new_cell][i] : new_mesh.nodes[new_cell][i], column) +=
-                weight * new_shapes[i] * gap;
+            difference.residual(node_of(new_mesh, new_cell, i), column) += weight * new_shapes[i] * gap;
         difference.squares[column] += weight * gap * gap;
       }
     }
@@ -98,14 +117,14 @@ class ConstrainedMass {
     entries.reserve(mesh.cells.size() * (Dim + 1) * (Dim + 1));
     for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
       const double mass = cell_mass(mesh, static_cast<int>(c));
-      if (const CurvedEdges curved = mesh.curved_edges(c)) {
-        const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
-        const auto& diagonal = constant_quadratic_mass<Dim>(MassKind::lumped, curved);
+      if (const CurvedEdges curved = mesh.curved_edges(c); curved || mesh.axisymmetric) {
+        const auto matrix = unit_mass(mesh, c, MassKind::consistent), diagonal = unit_mass(mesh, c, MassKind::lumped);
         for (int i = 0; i < kQuadraticNodes<Dim>; ++i) {
           if (!has_node<Dim>(curved, i)) continue;
-          lumped[mesh.nodes[c][i]] += mass * diagonal(i, i);
+          lumped[node_of(mesh, c, i)] += mass * diagonal(i, i);
           for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
-            if (has_node<Dim>(curved, j)) entries.emplace_back(mesh.nodes[c][i], mesh.nodes[c][j], mass * matrix(i, j));
+            if (has_node<Dim>(curved, j))
+              entries.emplace_back(node_of(mesh, c, i), node_of(mesh, c, j), mass * matrix(i, j));
         }
         continue;
       }
@@ -253,7 +272,7 @@ TouchedDifference touched_difference(const TransferMesh<Dim>& old_mesh, const Tr
     tree.query(box_of<Dim>(simplex.corners), hits);
     std::sort(hits.begin(), hits.end());
     for (const int hit : hits) {
-      if (new_mesh.curved_edges(c) || old_mesh.curved_edges(touched.old_cells[hit])) {
+      if (new_mesh.axisymmetric || new_mesh.curved_edges(c) || old_mesh.curved_edges(touched.old_cells[hit])) {
         list_overlap(simplex, old_simplices[hit], pieces);
         add_curved_difference(old_mesh, touched.old_cells[hit], new_mesh, c, pieces, u_old, u_bar, difference);
         continue;
@@ -325,15 +344,15 @@ VectorX mass_squares(const TransferMesh<Dim>& mesh, const MatrixX& d) {
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
     const double mass = cell_mass(mesh, static_cast<int>(c));
     const CurvedEdges curved = mesh.curved_edges(c);
-    if (!curved) {
+    if (!curved && !mesh.axisymmetric) {
       ElementMass<Dim>(MassKind::consistent, mass).add_product(mesh.cells[c], d, product);
       continue;
     }
-    const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, curved);
+    const auto matrix = unit_mass(mesh, c, MassKind::consistent);
     for (int i = 0; i < kQuadraticNodes<Dim>; ++i)
       for (int j = 0; j < kQuadraticNodes<Dim>; ++j)
         if (has_node<Dim>(curved, i) && has_node<Dim>(curved, j))
-          product.row(mesh.nodes[c][i]) += mass * matrix(i, j) * d.row(mesh.nodes[c][j]);
+          product.row(node_of(mesh, c, i)) += mass * matrix(i, j) * d.row(node_of(mesh, c, j));
   }
   return d.cwiseProduct(product).colwise().sum().transpose();
 }

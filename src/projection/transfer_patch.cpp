@@ -56,6 +56,7 @@ TransferPatch<Dim> make_transfer_patch(const Mesh<Dim>& old_mesh, const Mesh<Dim
                                        const std::map<int, Material>& materials, int rings) {
   TransferPatch<Dim> patch;
   Numbering<Dim> old_numbering(old_mesh, materials, patch.old_cells), numbering(mesh, materials, patch.new_cells);
+  patch.old_cells.axisymmetric = patch.new_cells.axisymmetric = patch.cells.axisymmetric = mesh.is_axisymmetric();
   for (const CellId c : touched.old_cells) old_numbering.add(c);
   std::vector<CellId> ids = touched.new_cells;
   std::unordered_set<CellId> inside(ids.begin(), ids.end());

@@ -20,8 +20,9 @@ struct TransferCells {
   std::vector<double> density;
   std::vector<std::array<int, kQuadraticNodes<Dim>>> nodes{};  ///< of curved cells; this and the next empty: there are none
   std::vector<CurvedEdges> curved{};
+  bool axisymmetric = false;
 
-  TransferMesh<Dim> view() const { return {rest, cells, density, nodes, curved}; }
+  TransferMesh<Dim> view() const { return {rest, cells, density, nodes, curved, axisymmetric}; }
   /// Adds a cell with these nodes, which are not read where `edges`, its curved ones, are none. `number(v)`: the number of a
   /// vertex or node, which adds new ones to `vertices`; their rest positions are the caller's.
   template <typename Number>

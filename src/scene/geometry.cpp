@@ -259,6 +259,27 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, K
   note_empty(keys.points, "vertex");
 }
 
+}  // namespace
+
+template <int Dim>
+void put_on_axis(const Node& geometry, std::vector<Vec<Dim>>& points) {
+  constexpr double kRoundOff = 1e-12;  // of the largest coordinate
+  if (Dim != 2 || !Node(geometry.document())["axisymmetric"].boolean(false)) return;
+  double size = 0;
+  for (const Vec<Dim>& X : points) size = std::max(size, X.template lpNorm<Eigen::Infinity>());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    double& r = points[v][0];
+    if (std::abs(r) <= kRoundOff * size)
+      r = 0;
+    else if (r < 0)
+      geometry["mesh"].fail(fmt::format("{} with vertex {} at r = {:g}", abbreviate(geometry["mesh"].json()), v,
+                                        r / geometry.document().units.factor("m")),
+                            "r >= 0 in an axisymmetric scene (x is r, y is z)");
+  }
+}
+
+namespace {
+
 template <int Dim>
 void read_body(const Node& geometry, const MeshFile& of_mesh, const References& references, Sets& sets, Collected<Dim>& all,
                std::vector<std::string>& warnings) {
@@ -269,6 +290,7 @@ void read_body(const Node& geometry, const MeshFile& of_mesh, const References& 
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
   const bool is_mirror = transform<Dim>(points, geometry);
+  put_on_axis<Dim>(geometry, points);
   const Box<Dim> box = bounding_box<Dim>(points);
   check_connected<Dim>(geometry, points, cells);
   orient_cells<Dim>(geometry, points, is_mirror, cells, warnings);
@@ -462,7 +484,8 @@ std::vector<Vec<Dim>> points_of(const MeshFile& file) {
 #define ITR_INSTANTIATE(Dim)                                                                                    \
   template Mesh<Dim> read_bodies(const Node&, const Geometries&, MeshFiles&, Sets&, std::vector<std::string>&); \
   template std::vector<Vec<Dim>> read_copies(const Node&, const Vec<Dim>&);                                     \
-  template std::vector<Vec<Dim>> points_of(const MeshFile&);
+  template std::vector<Vec<Dim>> points_of(const MeshFile&);                                                    \
+  template void put_on_axis(const Node&, std::vector<Vec<Dim>>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

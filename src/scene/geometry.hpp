@@ -78,5 +78,8 @@ std::vector<Vec<Dim>> read_copies(const Node& geometry, const Vec<Dim>& extent);
 /// The coordinates of a file in the dimension of the scene.
 template <int Dim>
 std::vector<Vec<Dim>> points_of(const MeshFile& file);
+/// In an axisymmetric scene takes points within round-off of the axis as on it, and refuses those beyond it.
+template <int Dim>
+void put_on_axis(const Node& geometry, std::vector<Vec<Dim>>& points);
 
 }  // namespace itr::scene

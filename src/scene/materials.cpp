@@ -56,6 +56,10 @@ const std::vector<LawName>& laws() {
   return all;
 }
 
+bool is_axisymmetric(const Node& node) { return Node(node.document())["axisymmetric"].boolean(false); }
+/// The scene, where laws are those of space.
+std::string in_space(const Node& node) { return is_axisymmetric(node) ? "an axisymmetric scene" : "a 3D scene"; }
+
 /// Reads the law of an entry, one of the terms of a sum if it is `in_sum`. Throws InputError for keys of other laws.
 const LawName& read_law(const Node& node, bool in_sum) {
   if (!node.json().is_object()) node.fail("a material");
@@ -146,7 +150,8 @@ class SumReader {
   LawSum read(const LawName& law, int invariants) {
     LawSum sum;
     sum.is_plane_stress = node_["plane_stress"].boolean(false);
-    if (sum.is_plane_stress && dimension_ == 3) node_["plane_stress"].fail("true in a 3D scene", "it in 2D only");
+    if (sum.is_plane_stress && dimension_ == 3)
+      node_["plane_stress"].fail("true in " + in_space(node_), "it in a plane only");
     sum.dimension = sum.is_plane_stress ? 3 : invariants;
     if (law.row) {
       sum.terms.push_back(read_term(node_, *law.row, false, sum));
@@ -354,7 +359,8 @@ class MaterialReader {
 
   void read_plane_strain() {
     material_.plane_strain = node_["plane_strain"].boolean(false);
-    if (material_.plane_strain && dimension_ == 3) node_["plane_strain"].fail("true in a 3D scene", "it in 2D only");
+    if (material_.plane_strain && dimension_ == 3)
+      node_["plane_strain"].fail("true in " + in_space(node_), "it in a plane only");
   }
 
   void read_lame() {
@@ -582,16 +588,18 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
     if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
       warnings.push_back(entry["rho"].pointer() + ": not given, so it is 1 kg/m^3");
   const bool is_polyfem = is_polyfem_set(root);
-  const bool has_patches = averages_volume(root) && !root["space"]["remesh"]["enabled"].boolean(false);
+  const bool has_patches =
+      averages_volume(root) && !root["space"]["remesh"]["enabled"].boolean(false) && !is_axisymmetric(root);
+  const int space = is_axisymmetric(root) ? 3 : Dim;
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
-    MaterialReader reader(node, Dim, is_polyfem, has_patches);
+    MaterialReader reader(node, space, is_polyfem, has_patches);
     for (const auto& [body, of_body] : points) materials[body] = reader.checked(of_body, warnings);
     return materials;
   }
   std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
-    MaterialReader reader(entry, Dim, is_polyfem, has_patches);
+    MaterialReader reader(entry, space, is_polyfem, has_patches);
     for (const auto& [label, id] : ids_of(entry, bodies, points)) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);

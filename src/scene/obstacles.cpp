@@ -169,6 +169,7 @@ void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets,
                           "a line or a flat mesh");
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   transform<Dim>(points, geometry);
+  put_on_axis<Dim>(geometry, points);
   const Box<Dim> box = bounding_box<Dim>(points);
   Surface surface = extract_surface(file, points);
   refine<Dim>(geometry, surface, points);

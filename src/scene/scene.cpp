@@ -71,6 +71,13 @@ Sets sets_of(const Geometry<Dim>& geometry) {
   return sets;
 }
 
+template <int Dim>
+void read_axisymmetric(const Node& root, Mesh<Dim>& mesh) {
+  const bool is_axisymmetric = root["axisymmetric"].boolean(false);
+  if (is_axisymmetric && Dim == 3) root["axisymmetric"].fail("true in a 3D scene", "it in 2D only");
+  if constexpr (Dim == 2) mesh.set_axisymmetric(is_axisymmetric);
+}
+
 /// All but geometry and the contact that comes with it.
 template <int Dim>
 void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
@@ -100,6 +107,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.units = root.document().units;
   Sets sets;
   setup.mesh = read_bodies<Dim>(root, geometries, files, sets, warnings);
+  read_axisymmetric(root, setup.mesh);
   setup.names = {sets.bodies.names(), sets.surfaces.names()};
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list) {
@@ -225,9 +233,10 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   for_each_file(root, geometries, [&](const Node& name, const char*) {
     warn_of_working_folder(name.pointer(), name.string(""), document.root, document.file, scene.warnings);
   });
-  document.units.dim = find_dimension(geometries, files);
+  const int dimension = find_dimension(geometries, files);
+  document.units.dim = root["axisymmetric"].boolean(false) ? 3 : dimension;  // nothing is by thickness
   scene.output = read_output(root);
-  if (document.units.dim == 2)
+  if (dimension == 2)
     scene.setup = read_setup<2>(root, geometries, files, scene.parts, scene.warnings);
   else
     scene.setup = read_setup<3>(root, geometries, files, scene.parts, scene.warnings);
@@ -250,6 +259,7 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
   Setup<Dim> setup;
   setup.names = {sets.bodies.names(), sets.surfaces.names()};
   setup.mesh = std::move(geometry.mesh);
+  read_axisymmetric(root, setup.mesh);
   geometry.obstacles.motion.assign(geometry.obstacles.rest.size(), kNone);
   read_model<Dim>(root, sets, {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);

@@ -29,7 +29,7 @@ ContactSurface<Dim> refined_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>&
   for (int o = 0; o < others; ++o) entries.emplace_back(own + o, nodes + o, 1);
   typename VertexMap<Dim>::Weights weights(own + others, nodes + others);
   weights.setFromTriplets(entries.begin(), entries.end());
-  return {surface_of_facets<Dim>(chords.facets, std::move(rest), obstacles),
+  return {surface_of_facets<Dim>(chords.facets, std::move(rest), obstacles, mesh.is_axisymmetric()),
           std::make_shared<VertexMap<Dim>>(weights, VectorX::Zero(Dim * (own + others)))};
 }
 
@@ -52,7 +52,7 @@ ClosedSurface<Dim> body_boundary(const Mesh<Dim>& mesh, ConstVectorView x, const
 
 template <int Dim>
 CollisionSurface collision_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obstacles) {
-  return surface_of_facets<Dim>(boundary_chords(mesh), mesh.rest(), obstacles);
+  return surface_of_facets<Dim>(boundary_chords(mesh), mesh.rest(), obstacles, mesh.is_axisymmetric());
 }
 
 /// y = X_proxy + W (x - X) for the proxy's vertices, y = x for the obstacles'.
@@ -126,7 +126,7 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
     return contact;
   }
   const CollisionProxy<Dim>& proxy = *setup.proxy;
-  SurfaceBuilder<Dim> builder;
+  SurfaceBuilder<Dim> builder(mesh.is_axisymmetric());
   for_each_simplex(proxy, 0, [&](const auto& ids) { builder.add(ids); });
   return {builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles), proxy_map(setup, mesh), true};
 }

@@ -11,6 +11,7 @@
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "mesh/rest_box.hpp"
+#include "mesh/turn.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/step_length.hpp"
@@ -46,7 +47,11 @@ template <int Dim>
 double mean_vertex_area(const Mesh<Dim>& mesh) {
   double area = 0;
   int vertices = 0;
-  for (const FacetId f : mesh.live_facets()) area += facet_measure(mesh, f);
+  for (const FacetId f : mesh.live_facets()) {
+    Vec<Dim> middle = Vec<Dim>::Zero();
+    for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / Dim;
+    area += facet_measure(mesh, f) * turn_at(mesh, middle);
+  }
   for (VertexId v = 0; v < mesh.node_slots(); ++v) vertices += mesh.is_vertex_alive(v) && mesh.is_boundary(v);
   return area / std::max(1, vertices);
 }
@@ -62,8 +67,8 @@ double available_energy(const Setup<Dim>& setup) {
   for (const Vec<Dim>& p : setup.obstacles.rest) box.extend(p);
   double energy = 0;
   for (const CellId c : mesh.live_cells()) {
-    const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c);
     const Vec<Dim> X = mesh.barycenter(c);
+    const double mass = setup.materials.at(mesh.body(c)).density * mesh.volume(c) * turn_at(mesh, X);
     if (setup.body_acceleration) energy += mass * setup.body_acceleration(X, setup.time.t0).cwiseAbs().dot(box.sizes());
     for (const auto& condition : setup.initial_velocity)
       if (condition.body == mesh.body(c)) {
@@ -184,7 +189,8 @@ template <int Dim>
 std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
   for (const CellId c : setup.mesh.live_cells())
-    energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+    energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
+              turn_at(setup.mesh, setup.mesh.barycenter(c));
   const double available = available_energy(setup);
   if (available > 0) energy = std::min(energy, available);
   setup.follows_stored_energy.split = available == 0;

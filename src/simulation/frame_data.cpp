@@ -13,6 +13,7 @@
 #include "energy/elastic/jacobian_barrier.hpp"
 #include "energy/elastic/law_sum.hpp"
 #include "energy/elastic/patched_volume.hpp"
+#include "energy/elastic/turned.hpp"
 #include "energy/inertia.hpp"
 #include "fem/locator.hpp"
 #include "simulation/contact_surface.hpp"
@@ -23,14 +24,42 @@ namespace itr {
 
 namespace {
 
-/// Where output samples a cell: its mean has the weights `fraction`.
+/// Where output samples a cell: its mean has the weights `fraction`, with the turn in axisymmetric ones.
 template <int Dim>
 struct CellPoint {
   Mat<Dim> F;
   Vec<Dim> X;
   std::array<double, Dim + 1> weights;  ///< barycentric coordinates
   double fraction;
+  double hoop = 0;  ///< F33 of a turned cell, else 0
 };
+
+/// The points of a turned cell, at those of its elastic energy's quadrature.
+void sample_turned(const CellSet<2>& cells, const CellSet<2>::Element& element, const VectorX& x, int level, int degree,
+                   std::vector<CellPoint<2>>& points) {
+  const Nodal<2> positions = at_nodes<2>(element.nodes(), x);
+  double total = 0;
+  for (const auto& point : cell_quadrature<2>(level, degree_with_turn(degree, true))) {
+    const ElasticSite<2, 3> site(cells, element, point);
+    if (site.turn == 0) continue;
+    const Mat<3> F = site.deformation_gradient(positions);
+    const Vec<2> X = rest_position<2>(cells, element, point.weights);
+    points.push_back({F.topLeftCorner<2, 2>(), X, point.weights, site.weight(1), F(2, 2)});
+    total += site.weight(1);
+  }
+  for (auto& point : points) point.fraction /= total;
+}
+
+/// F and place of a point in space; F33 is 1 where the cell is not turned.
+template <int Dim>
+std::pair<Mat<3>, Vec<3>> in_space(const CellPoint<Dim>& point) {
+  Mat<3> F = Mat<3>::Identity();
+  F.template topLeftCorner<Dim, Dim>() = point.F;
+  if (point.hoop != 0) F(2, 2) = point.hoop;
+  Vec<3> X = Vec<3>::Zero();
+  X.template head<Dim>() = point.X;
+  return {F, X};
+}
 
 /// f(element, points) for each cell in the mesh's order: one point where F is constant, those of the elastic energy's
 /// quadrature in cells with curved edges, of which `levels` are those of the state.
@@ -44,12 +73,18 @@ void for_each_cell_in_order(const CellSet<Dim>& cells, const VectorX& x, const Q
   middle.fill(1.0 / (Dim + 1));
   for (std::size_t e = 0; const auto* element : ordered) {
     points.clear();
+    if constexpr (Dim == 2)
+      if (cells.axisymmetric) {
+        sample_turned(cells, *element, x, levels.empty() ? 0 : levels[e++], degree, points);
+        f(*element, std::span<const CellPoint<Dim>>(points));
+        continue;
+      }
     if (element->curved)
       for (const auto& point : cell_quadrature<Dim>(levels.empty() ? 0 : levels[e++], degree))
         points.push_back({at_nodes<Dim>(element->nodes(), x) * shape_gradients<Dim>(*element, point.weights).transpose(),
-                          rest_position<Dim>(cells, *element, point.weights), point.weights, point.fraction});
+                          rest_position<Dim>(cells, *element, point.weights), point.weights, point.fraction, 0});
     else
-      points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), middle, 1});
+      points.push_back({deformation_gradient<Dim>(*element, x), rest_barycenter(cells, *element), middle, 1, 0});
     f(*element, std::span<const CellPoint<Dim>>(points));
   }
 }
@@ -172,6 +207,10 @@ double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
   return std::sqrt(1.5) * deviator.norm();
 }
 
+Mat<3> stress_in_space(const Material& material, const Mat<3>& F, const Vec<3>& X) {
+  return elastic_stress<3>(F, elastic_moduli<3>(material, X)) * F.transpose() / F.determinant();
+}
+
 template <int Dim>
 double out_of_plane_stress(const Material& material, const ElasticModuli& moduli, const Mat<Dim>& F) {
   if (Dim == 3 || !material.plane_strain || (sum_of(material) && sum_of(material)->dimension == 2)) return 0;
@@ -188,9 +227,16 @@ CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const Quadr
     const Material& material = frame.materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
     double equivalent = 0;
-    for (const auto& point : points) {
-      const ElasticModuli moduli = frame.moduli(material, element, point);
+    for (const CellPoint<Dim>& point : points) {
       const Mat<Dim>& F = point.F;
+      if (point.hoop != 0) {
+        const auto [F3, X3] = in_space(point);
+        const Mat<3> here = stress_in_space(material, F3, X3);
+        cauchy += point.fraction * here.template topLeftCorner<Dim, Dim>();
+        equivalent += point.fraction * von_mises<3>(here, 0);
+        continue;
+      }
+      const ElasticModuli moduli = frame.moduli(material, element, point);
       const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, material));
       cauchy += point.fraction * here;
       equivalent += point.fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, moduli, F));
@@ -256,9 +302,15 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   const auto add_density = [&](const auto& element, auto points) {
     const Material& material = frame.materials.at(element.body);
     double mean = frame.density(element);
-    for (const auto& point : points)
-      mean += point.fraction * elastic_density<Dim>(point.F, cell_moduli<Dim>(cells, material, point.X));
-    if (element.curved)
+    for (const CellPoint<Dim>& point : points) {
+      if (point.hoop != 0) {
+        const auto [F3, X3] = in_space(point);
+        mean += point.fraction * elastic_density<3>(F3, elastic_moduli<3>(material, X3));
+      } else {
+        mean += point.fraction * elastic_density<Dim>(point.F, cell_moduli<Dim>(cells, material, point.X));
+      }
+    }
+    if (element.curved && !cells.axisymmetric)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
                                    cell_moduli<Dim>(cells, material, rest_barycenter<Dim>(cells, element)));
     data.elastic_density.push_back(mean);

@@ -34,6 +34,8 @@ class HistoryTransfer {
     for (std::size_t i = 0; i < n; ++i) {
       const auto tags = rule.tags_of_node(mesh, patch_.new_cells.vertices[i]);
       for (int c = 0; c < Dim; ++c) prescribed_[Dim * i + c] = tags[c] != kNoTag;
+      on_axis_.push_back(mesh.is_on_axis(patch_.new_cells.vertices[i]));
+      if (on_axis_.back()) prescribed_[Dim * i] = 1;
     }
   }
 
@@ -51,8 +53,8 @@ class HistoryTransfer {
     std::vector<char> fixed(patch_.new_cells.vertices.size() * columns, 0);
     for (std::size_t v = 0; v < patch_.new_cells.vertices.size(); ++v)
       for (Eigen::Index k = 0; k < columns; ++k)
-        fixed[v * columns + k] =
-            patch_.at_rim[v] || (k < static_cast<Eigen::Index>(Dim * num_positions) && prescribed_[Dim * v + k % Dim]);
+        fixed[v * columns + k] = patch_.at_rim[v] || (on_axis_[v] && k % Dim == 0) ||
+                                 (k < static_cast<Eigen::Index>(Dim * num_positions) && prescribed_[Dim * v + k % Dim]);
     TransferReport transfer;
     const MatrixX correction =
         solve_projection(patch_.new_cells.view(), difference_.residual.leftCols(columns), fixed, transfer);
@@ -124,6 +126,7 @@ class HistoryTransfer {
   const Mesh<Dim>& mesh_;
   TransferPatch<Dim> patch_;
   std::vector<char> prescribed_;  ///< by dof of the patch
+  std::vector<char> on_axis_;     ///< by its vertex: it has no radial displacement and velocity
   std::vector<MatrixX> old_values_, new_values_;
   TouchedDifference difference_;
 };

@@ -79,8 +79,9 @@ struct TransferArrays {
   std::vector<Vec<Dim>> rest;
   std::vector<std::array<int, Dim + 1>> cells;
   std::vector<double> density;
+  bool axisymmetric;
 
-  TransferArrays(const Mesh<Dim>& mesh, const std::map<int, double>& by_body) {
+  TransferArrays(const Mesh<Dim>& mesh, const std::map<int, double>& by_body) : axisymmetric(mesh.is_axisymmetric()) {
     for (VertexId v = 0; v < mesh.num_vertices(); ++v) rest.push_back(mesh.rest(v));
     for (CellId c = 0; c < mesh.cell_slots(); ++c) {
       const auto found = by_body.find(mesh.body(c));
@@ -88,7 +89,7 @@ struct TransferArrays {
       density.push_back(found == by_body.end() ? 1 : found->second);
     }
   }
-  TransferMesh<Dim> view() const { return {rest, cells, density}; }
+  TransferMesh<Dim> view() const { return {rest, cells, density, {}, {}, axisymmetric}; }
 };
 
 }  // namespace

@@ -86,7 +86,7 @@ PatchSurface<Dim> patch_surface(const Mesh<Dim>& mesh, const Obstacles<Dim>& obs
     }
     return it->second;
   };
-  SurfaceBuilder<Dim> builder;
+  SurfaceBuilder<Dim> builder(mesh.is_axisymmetric());
   const auto add = [&](auto ids) {
     if (!is_near(ids)) return;
     for (int& v : ids) v = local(v);

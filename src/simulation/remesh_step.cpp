@@ -104,7 +104,7 @@ QuadratureLevels levels_by_cell(const State<Dim>& state) {
   QuadratureLevels levels(state.mesh.cell_slots(), 0);
   std::size_t next = 0;
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (state.mesh.is_curved(c)) levels[c] = state.quadrature[next++];
+    if (state.mesh.is_axisymmetric() || state.mesh.is_curved(c)) levels[c] = state.quadrature[next++];
   return levels;
 }
 
@@ -118,7 +118,7 @@ QuadratureLevels levels_by_element(const QuadratureLevels& by_slot, const std::v
     if (number[slot] != kNone) by_cell[number[slot]] = by_slot[slot];
   QuadratureLevels levels;
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c)
-    if (state.mesh.is_curved(c)) levels.push_back(by_cell[c]);
+    if (state.mesh.is_axisymmetric() || state.mesh.is_curved(c)) levels.push_back(by_cell[c]);
   return levels;
 }
 
@@ -149,7 +149,7 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   const StepSetup<Dim>& setup = tools.setup;
   const TimeIntegrator integrator(setup.time);
   StepContext<Dim> context;
-  static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, state.t);
+  static_cast<PotentialTerms<Dim>&>(context) = potential_terms(setup, state.history, state.t, state.mesh.is_axisymmetric());
   // Patches see a cavity's pressure as it is: what they move hardly changes its volume.
   const CellSet<Dim> cells = context.loads.cavities.empty() ? CellSet<Dim>() : whole_mesh(state.mesh, setup.obstacles.rest);
   for (const CavityLoad& cavity : std::exchange(context.loads.cavities, {}))

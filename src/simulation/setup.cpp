@@ -159,7 +159,7 @@ void check_materials(const Setup<Dim>& setup) {
 }
 
 /// A vertex where facets with these tags end: in 2D they do not go on there, in 3D an edge there has one of them; kNone:
-/// they close.
+/// they close, with or without the axis.
 template <int Dim>
 VertexId find_rim(const Mesh<Dim>& mesh, const std::vector<int>& tags) {
   std::map<std::array<VertexId, Dim - 1>, int> sides;  // facets that go one way there less those that go the other
@@ -174,7 +174,7 @@ VertexId find_rim(const Mesh<Dim>& mesh, const std::vector<int>& tags) {
             facet[k] < facet[(k + 1) % 3] ? 1 : -1;
   }
   for (const auto& [at, count] : sides)
-    if (count != 0) return at[0];
+    if (count != 0 && !mesh.is_on_axis(at[0])) return at[0];
   return kNone;
 }
 
@@ -237,6 +237,10 @@ template <int Dim>
 void Setup<Dim>::validate() const {
   if (mesh.num_cells() == 0) refuse("mesh", "no cells", "at least one");
   StepSetup<Dim>::validate();
+  if (mesh.is_axisymmetric())
+    for (const VertexId v : mesh.live_vertices())
+      if (!(mesh.rest(v)[0] >= 0))
+        refuse("mesh", fmt::format("vertex {} at r = {:g} m", v, mesh.rest(v)[0]), "r >= 0 in an axisymmetric scene");
   check_materials(*this);
   check_proxy(*this);
   check_cavities(*this);

@@ -66,7 +66,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
                               ProblemCache<Dim>& cache, const BarrierStiffness& stiffness, const QuadratureLevels& levels,
                               const ChordLevels& chords)
     : setup_(setup),
-      terms_(potential_terms(setup, history, t)),
+      terms_(potential_terms(setup, history, t, mesh.is_axisymmetric())),
       scope_(cache.scope_of(setup, mesh, chords)),
       cells_(scope_->cells),
       surface_(scope_->surface),
@@ -361,7 +361,9 @@ double StepProblem<Dim>::mechanical_energy(const VectorX& x, const VectorX& v) {
 template <int Dim>
 double StepProblem<Dim>::energy_resolution() const {
   double stiffness = 0;
-  for (const auto& element : cells_.elements) stiffness += element.volume * setup_.materials.at(element.body).youngs_modulus;
+  for (const auto& element : cells_.elements)
+    stiffness += element.volume * cells_.turn(rest_barycenter<Dim>(cells_, element)) *
+                 setup_.materials.at(element.body).youngs_modulus;
   return kEnergyResolution * stiffness;
 }
 

@@ -89,8 +89,12 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
       result.target[Dim * node + c] = target[c];
     }
   };
-  for (VertexId node = 0; node < mesh.node_slots(); ++node)
+  for (VertexId node = 0; node < mesh.node_slots(); ++node) {
     hold(node, rule.tags_of_node(mesh, node), [&] { return mesh.point_of_node(node); });
+    if (!mesh.is_on_axis(node)) continue;
+    result.held[Dim * node] = 1;
+    result.target[Dim * node] = 0;
+  }
   for (int o = 0; o < total - bodies; ++o) {
     const Vec<Dim>& X = setup.obstacles.rest[o];
     const int motion = setup.obstacles.motion.empty() ? kNone : setup.obstacles.motion[o];
@@ -124,13 +128,14 @@ std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t) {
 }
 
 template <int Dim>
-PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t) {
+PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t, bool is_axisymmetric) {
   const TimeIntegrator integrator(setup.time);
   std::vector<TermFactory<Dim>> host = setup.terms;
   host.insert(host.end(), setup.nodal_loads.begin(), setup.nodal_loads.end());
   return {.materials = materials_at(setup, t),
           .loads = loads_at(setup, t),
           .has_inertia = setup.time.has_inertia(),
+          .axisymmetric = is_axisymmetric,
           .mass = setup.lump_mass ? MassKind::lumped : MassKind::consistent,
           .quadrature_degree = setup.quadrature_degree,
           .scaling = integrator.scaling(history),
@@ -142,14 +147,14 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .follower = {}};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                        \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                 \
-  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double); \
-  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                      \
-  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                   \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);           \
-  template double relative_motion<Dim>(const VectorX&);                                             \
+#define ITR_INSTANTIATE(Dim)                                                                              \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                       \
+  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                      \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool); \
+  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                            \
+  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                         \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                 \
+  template double relative_motion<Dim>(const VectorX&);                                                   \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

@@ -22,7 +22,7 @@ std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t);
 
 /// Terms that act in the step that ends at time t, as every scope of it sees them.
 template <int Dim>
-PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t);
+PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t, bool is_axisymmetric);
 
 /// Which dofs of nodes are held (Dirichlet and obstacles) and where they are to be at time t. HeldRule says which condition
 /// counts where there are several.

@@ -18,6 +18,11 @@ bool may_curve(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
+bool has_patches(const Setup<Dim>& setup) {
+  return std::ranges::any_of(setup.materials, [](const auto& e) { return e.second.volume == VolumeForm::patches; });
+}
+
+template <int Dim>
 struct Check {
   UnsupportedCombination combination;
   bool (*applies)(const Setup<Dim>&, bool);
@@ -42,16 +47,36 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool curves) { return (!setup.terms.empty() || setup.follower.forces) && curves; }},
     {{"/contact/adhesion", "adhesion where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.contact.has_adhesion(); }},
+    {{"/contact/adhesion", "adhesion in an axisymmetric scene: its pull on a pair is not by the area around the axis"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && setup.contact.has_adhesion(); }},
+    {{"/materials/*/volume", "\"patches\" in an axisymmetric scene: their means are not over the full turn"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && has_patches(setup); }},
     {{"/materials/*/volume", "\"patches\" where the mesh changes: a gain by fewer patches would not be one of the mesh"},
-     [](const Setup<Dim>& setup, bool) {
-       return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),
-                                                  [](const auto& e) { return e.second.volume == VolumeForm::patches; });
-     }},
+     [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && has_patches(setup); }},
     {{"/materials/*/volume", "\"patches\" for a law without a part U(det F), with moduli that vary, or in plane stress"},
      [](const Setup<Dim>& setup, bool) {
        return std::any_of(setup.materials.begin(), setup.materials.end(), [](const auto& e) {
          return e.second.volume == VolumeForm::patches && !may_average_volume(e.second, Dim);
        });
+     }},
+    {{"/axisymmetric", "remeshing of axisymmetric bodies with lumped mass, or by the paper's screening and sizing field"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && setup.mesh.is_axisymmetric() &&
+              (setup.lump_mass || setup.remesh.sizing_field.enabled ||
+               setup.remesh.screening == Screening::energy_percentile);
+     }},
+    {{"/materials", "an elasticity_tensor, or a law of a program's own, where axisymmetric bodies are remeshed"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.mesh.is_axisymmetric() && setup.remesh.enabled &&
+              std::ranges::any_of(setup.materials,
+                                  [](const auto& e) { return e.second.law == MaterialLaw::own && !sum_of(e.second); });
+     }},
+    {{"/materials", "plane stress, or invariants of a plane, in an axisymmetric scene"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.mesh.is_axisymmetric() && std::ranges::any_of(setup.materials, [](const auto& e) {
+                const LawSum* sum = sum_of(e.second);
+                return sum && (sum->is_plane_stress || sum->dimension == 2);
+              });
      }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {

@@ -8,6 +8,7 @@
 
 #include "geometry/rotation.hpp"
 #include "mesh/rest_box.hpp"
+#include "mesh/turn.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/named.hpp"
@@ -31,7 +32,8 @@ template <int Dim>
 double stiffness(const Setup<Dim>& setup) {
   double sum = 0;
   for (const CellId c : setup.mesh.live_cells())
-    sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c);
+    sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
+           turn_at(setup.mesh, setup.mesh.barycenter(c));
   return sum;
 }
 
@@ -118,8 +120,8 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
     for (Eigen::Index i = 0; i < gradient.size(); i += Dim) force += gradient.segment<Dim>(i).norm() / 2;
     if (setup.body_acceleration)
       for (const CellId c : state.mesh.live_cells()) {
-        const Vec<Dim> a = setup.body_acceleration(state.mesh.barycenter(c), state.t);
-        weight += setup.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) * a.norm();
+        const Vec<Dim> X = state.mesh.barycenter(c), a = setup.body_acceleration(X, state.t);
+        weight += setup.materials.at(state.mesh.body(c)).density * state.mesh.volume(c) * a.norm() * turn_at(state.mesh, X);
       }
     const bool counts = most_elastic_ > kNoStrain * kNoStrain * stiffness(setup) && weight < kSmallWeight * force;
     const double work = counts ? -x.dot(gradient) : 0;  // distances are homogeneous in x

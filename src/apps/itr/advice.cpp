@@ -279,7 +279,8 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
     const char* help =
         "quadratic elements (/space/discr_order: 2), remeshing (/space/remesh/enabled) or a finer mesh (n_refs) help: "
         "compare";
-    const bool keeps_volume = (Dim == 3 || material.plane_strain) && material.volume == VolumeForm::pointwise;
+    const bool keeps_volume =
+        (Dim == 3 || material.plane_strain || setup.mesh.is_axisymmetric()) && material.volume == VolumeForm::pointwise;
     const bool is_thin = size.thickness < kSlender * size.diagonal && layers < few_layers;
     if (setup.remesh.enabled) {
       if (is_thin)
@@ -461,7 +462,9 @@ std::vector<std::string> foretell(const Setup<Dim>& setup) {
     mass += material.density * of_body.volume;
     plane_strain.insert(material.plane_strain);
   }
-  if (Dim == 2)
+  if (setup.mesh.is_axisymmetric())
+    words.push_back("bodies of revolution about x = 0: masses, forces and energies of the full turn");
+  else if (Dim == 2)
     words.push_back(fmt::format("{}, for a thickness of 1 {}",
                                 plane_strain.size() > 1 ? "plane stress and plane strain, by body"
                                 : *plane_strain.begin() ? "plane strain"

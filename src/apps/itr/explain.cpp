@@ -83,7 +83,8 @@ class Explanation {
     if (const Units& units = setup_.units; !units.is_si())
       fmt::print("units\n  {}, {}, {}: forces in {}, stresses in {}, energies in {}{}; results {}\n", units.length(),
                  units.mass(), units.time(), units.name("N"), units.name("Pa"), units.name("J"),
-                 Dim == 2 ? ", by " + units.length() + " of thickness" : "", results.is_si() ? "in SI units" : "too");
+                 Dim == 2 && !setup_.mesh.is_axisymmetric() ? ", by " + units.length() + " of thickness" : "",
+                 results.is_si() ? "in SI units" : "too");
     bodies();
     fmt::print("time\n  {}\n", describe(setup_.time, setup_.units));
     fmt::print("in words\n");
@@ -113,15 +114,16 @@ class Explanation {
     const Mesh<Dim>& mesh = setup_.mesh;
     const MeshFigures<Dim> figures(mesh);
     const Units& units = setup_.units;
-    fmt::print("bodies ({}D)\n", Dim);
+    const bool is_area = Dim == 2 && !mesh.is_axisymmetric();
+    fmt::print("bodies ({}D{})\n", Dim, mesh.is_axisymmetric() ? ", axisymmetric" : "");
     for (const auto& [id, sum] : figures.bodies) {
       const Material& material = setup_.materials.at(id);
       const auto order = setup_.order.find(id);
       const std::string name = set_text(setup_.names.bodies, id);
       fmt::print("  id {}{}: {} {} elements, {} {}, {}, E {}, nu {:.4g}{}, rho {:.4g} {}, mass {}\n", id,
                  name == std::to_string(id) ? "" : " (" + name + ")", sum.cells,
-                 order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", Dim == 2 ? "area" : "volume",
-                 units.text(sum.volume, Dim == 2 ? "m^2" : "m^3"),
+                 order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", is_area ? "area" : "volume",
+                 units.text(sum.volume, is_area ? "m^2" : "m^3"),
                  sum_of(material) ? sum_of(material)->name() : kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
                  material.volume == VolumeForm::patches ? " (volume averaged over patches)" : "",

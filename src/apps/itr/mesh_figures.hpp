@@ -7,6 +7,7 @@
 #include <map>
 
 #include "itr/mesh.hpp"
+#include "mesh/turn.hpp"
 
 namespace itr::cli {
 
@@ -37,7 +38,7 @@ struct MeshFigures {
     for (const CellId c : mesh.live_cells()) {
       Body& body = bodies[mesh.body(c)];
       ++body.cells;
-      body.volume += mesh.volume(c);
+      body.volume += mesh.volume(c) * turn_at(mesh, mesh.barycenter(c));
       for (const VertexId v : mesh.cell(c)) box.extend(mesh.rest(v));
       slivers += mesh.quality(c) < kSliver;
       if (mesh.quality(c) < worst_quality) worst_quality = mesh.quality(c), worst_cell = c;

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 
 #include "itr/contact.hpp"
@@ -91,18 +92,24 @@ void add_topology_of_triangles(std::span<const Vec<3>> rest, CollisionSurface& s
   }
 }
 
+/// The mean of 2 pi R over an edge with the weight that falls linearly from one end to the other; of a plane beyond the axis
+/// nothing.
+double turn_at(double R, double other_end) { return std::max(0.0, 2 * std::numbers::pi * (2 * R + other_end) / 3); }
+
 }  // namespace
 
 template <int Dim>
 void complete_collision_surface(CollisionSurface& surface, std::span<const int> points, std::span<const Vec<Dim>> rest) {
   ++surface.revision;
+  const auto is_on_axis = [&](const std::array<int, 2>& edge) { return rest[edge[0]][0] == 0 && rest[edge[1]][0] == 0; };
+  if (surface.axisymmetric) std::erase_if(surface.edges, is_on_axis);
   sort_edges(surface);
   surface.area.assign(rest.size(), 0);
   surface.degree.assign(rest.size(), 0);
   for (const auto& [a, b] : surface.edges) {
     const double half = (rest[b] - rest[a]).norm() / 2;
     for (const int v : {a, b}) {
-      surface.area[v] += half;
+      surface.area[v] += surface.axisymmetric ? half * turn_at(rest[v][0], rest[v == a ? b : a][0]) : half;
       ++surface.degree[v];
     }
   }
@@ -117,8 +124,9 @@ void complete_collision_surface(CollisionSurface& surface, std::span<const int> 
 template <int Dim>
 CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
                                         std::span<const int> points, std::span<const Vec<Dim>> rest,
-                                        std::vector<char> counts) {
+                                        std::vector<char> counts, bool axisymmetric) {
   CollisionSurface surface;
+  surface.axisymmetric = axisymmetric;
   surface.edges = std::move(edges);
   surface.triangles = std::move(triangles);
   surface.counts = std::move(counts);
@@ -144,13 +152,13 @@ std::vector<std::array<int, 2>> find_intersections<3>(const CollisionSurface& su
   return find_intersections(x, surface.edges, surface.triangles, surface.counts, most, surface.closed);
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                              \
-  template void complete_collision_surface<Dim>(CollisionSurface&, std::span<const int>, std::span<const Vec<Dim>>);      \
-  template CollisionSurface make_collision_surface<Dim>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, \
-                                                        std::span<const int>, std::span<const Vec<Dim>>,                  \
-                                                        std::vector<char>);                                               \
-  template std::shared_ptr<const CollisionSurface> collision_surface<Dim>(                                                \
-      std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, std::span<const int>, std::span<const Vec<Dim>>,  \
+#define ITR_INSTANTIATE(Dim)                                                                                                \
+  template void complete_collision_surface<Dim>(CollisionSurface&, std::span<const int>, std::span<const Vec<Dim>>);        \
+  template CollisionSurface make_collision_surface<Dim>(std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>,   \
+                                                        std::span<const int>, std::span<const Vec<Dim>>, std::vector<char>, \
+                                                        bool);                                                              \
+  template std::shared_ptr<const CollisionSurface> collision_surface<Dim>(                                                  \
+      std::vector<std::array<int, 2>>, std::vector<std::array<int, 3>>, std::span<const int>, std::span<const Vec<Dim>>,    \
       std::vector<char>);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

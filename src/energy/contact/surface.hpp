@@ -22,7 +22,9 @@ struct Adjacency {
 /// of (the whole scene or a patch), and the per-vertex arrays have one entry for every vertex of that problem. What is said
 /// of a vertex's or an edge's neighbours refers to the *whole* surface, also where only a part of it is here.
 struct CollisionSurface {
-  int revision = 0;                           ///< another one whenever it is made anew in the same place
+  int revision = 0;  ///< another one whenever it is made anew in the same place
+  /// Whether rest lengths are areas of the full turn about the axis x = 0 (2D); edges on it, at rest, are no surface then.
+  bool axisymmetric = false;
   std::vector<int> vertices;                  ///< those on the surface, ascending
   std::vector<std::array<int, 2>> edges;      ///< surface edges, smaller id first, ascending
   std::vector<std::array<int, 3>> triangles;  ///< 3D only
@@ -51,7 +53,7 @@ struct CollisionSurface {
 template <int Dim>
 CollisionSurface make_collision_surface(std::vector<std::array<int, 2>> edges, std::vector<std::array<int, 3>> triangles,
                                         std::span<const int> points, std::span<const Vec<Dim>> rest,
-                                        std::vector<char> counts);
+                                        std::vector<char> counts, bool axisymmetric = false);
 
 /// Makes the rest of a surface of which edges, triangles and `counts` are set, in the memory that is there.
 template <int Dim>

@@ -21,6 +21,7 @@ void for_each_simplex(const Surface& surface, int first, const F& f) {
 template <int Dim>
 class SurfaceBuilder {
  public:
+  explicit SurfaceBuilder(bool axisymmetric) : axisymmetric_(axisymmetric) {}
   template <std::size_t N>
   void add(const std::array<int, N>& simplex) {
     if constexpr (N == 1) points_.push_back(simplex[0]);
@@ -28,7 +29,8 @@ class SurfaceBuilder {
     if constexpr (N == 3) triangles_.push_back(simplex);
   }
   CollisionSurface build(const std::vector<Vec<Dim>>& rest, std::vector<char> counts) {
-    return make_collision_surface<Dim>(std::move(edges_), std::move(triangles_), points_, rest, std::move(counts));
+    return make_collision_surface<Dim>(std::move(edges_), std::move(triangles_), points_, rest, std::move(counts),
+                                       axisymmetric_);
   }
   /// Adds the obstacles, whose vertices follow those of `rest` and do not count.
   template <typename Obstacles>
@@ -40,6 +42,7 @@ class SurfaceBuilder {
   }
 
  private:
+  bool axisymmetric_;
   std::vector<std::array<int, 2>> edges_;
   std::vector<std::array<int, 3>> triangles_;
   std::vector<int> points_;
@@ -48,8 +51,8 @@ class SurfaceBuilder {
 /// The surface of bodies by facets between their vertices, of which those of facets count, and of obstacles.
 template <int Dim, typename Obstacles>
 CollisionSurface surface_of_facets(const std::vector<std::array<int, Dim>>& facets, std::vector<Vec<Dim>> rest,
-                                   const Obstacles& obstacles) {
-  SurfaceBuilder<Dim> builder;
+                                   const Obstacles& obstacles, bool axisymmetric) {
+  SurfaceBuilder<Dim> builder(axisymmetric);
   std::vector<char> counts(rest.size(), 0);
   for (const auto& facet : facets) {
     builder.add(facet);

@@ -143,7 +143,7 @@ template <int Dim>
 void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double scale, int degree) {
   scale_ = scale;
   curved_.reset();
-  if (cells_.has_curved()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
+  if (!cells_.curved().empty()) curved_ = std::make_unique<QuadraticElasticity<Dim>>(cells_, materials, scale, degree);
   patched_.reset();
   if (cells_.patches)
     patched_ = std::make_unique<PatchedVolume<Dim>>(

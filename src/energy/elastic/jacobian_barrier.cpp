@@ -20,15 +20,6 @@ constexpr double kFraction = 1.0 / (1 << kRefinements<Dim>);
 template <int Dim>
 constexpr std::size_t kCoefficients = Dim == 2 ? 6 : 20;
 
-/// phi and its derivatives by s.
-struct Phi {
-  double value, first, second;
-};
-Phi phi(double s, double s0) {
-  const double r = s / s0, u = r - 1, log = std::log(r);
-  return {-u * u * log, (-2 * u * log - u * u / r) / s0, (-2 * log - 4 * u / r + u * u / (r * r)) / (s0 * s0)};
-}
-
 template <int Dim>
 const auto& coefficients() {
   return BernsteinTable<Dim, 1>::get().coefficients;
@@ -69,6 +60,11 @@ bool varies_little(const std::array<Mat<Dim>, Dim + 1>& F) {
 }
 
 }  // namespace
+
+BarrierPhi barrier_phi(double s, double s0) {
+  const double r = s / s0, u = r - 1, log = std::log(r);
+  return {-u * u * log, (-2 * u * log - u * u / r) / s0, (-2 * log - 4 * u / r + u * u / (r * r)) / (s0 * s0)};
+}
 
 template <int Dim>
 double JacobianBarrier<Dim>::Part::coefficient(std::size_t k) const {
@@ -179,7 +175,7 @@ template <int Dim>
 double JacobianBarrier<Dim>::value() const {
   if (least_ratio_ == 0) return std::numeric_limits<double>::infinity();
   double sum = 0;
-  for (const Active& active : active_) sum += phi(active.ratio, kActive).value;
+  for (const Active& active : active_) sum += barrier_phi(active.ratio, kActive).value;
   return kFraction<Dim> * sum;
 }
 
@@ -200,7 +196,7 @@ typename JacobianBarrier<Dim>::Nodal JacobianBarrier<Dim>::gradient() const {
   for (std::size_t p = 0, next = 0; p < parts_.size(); ++p) {
     const Shapes shapes = shapes_of(parts_[p]);
     for (; next < active_.size() && active_[next].part == p; ++next) {
-      const double slope = kFraction<Dim> / mean_ * phi(active_[next].ratio, kActive).first;
+      const double slope = kFraction<Dim> / mean_ * barrier_phi(active_[next].ratio, kActive).first;
       add_gradient(parts_[p], shapes, active_[next].coefficient, slope, gradient);
       of_mean -= slope * active_[next].ratio;
     }
@@ -224,7 +220,7 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
     const Shapes shapes = shapes_of(parts_[p]);
     for (; next < active_.size() && active_[next].part == p; ++next) {
       const auto [part, k, ratio] = active_[next];
-      const Phi value = phi(ratio, kActive);
+      const BarrierPhi value = barrier_phi(ratio, kActive);
       Nodal of_ratio = -ratio / mean_ * of_mean;
       add_gradient(parts_[p], shapes, k, 1 / mean_, of_ratio);
       const Eigen::Map<const Column> ds(of_ratio.data());

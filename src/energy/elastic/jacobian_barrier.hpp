@@ -17,6 +17,12 @@
 
 namespace itr {
 
+/// phi and its derivatives by s.
+struct BarrierPhi {
+  double value, first, second;
+};
+BarrierPhi barrier_phi(double s, double s0);
+
 /// At one cell's positions.
 template <int Dim>
 class JacobianBarrier {

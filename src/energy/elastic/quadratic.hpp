@@ -22,6 +22,7 @@
 #include "itr/types.hpp"
 #include "jacobian_barrier.hpp"
 #include "patched_volume.hpp"
+#include "turned.hpp"
 
 namespace itr {
 
@@ -33,19 +34,6 @@ constexpr double kBlindTolerance = 0.1;  ///< relative, of the bound that tells
 /// Where the Jacobian varies less, det F is anywhere at least ((1 - 0.2) / (1 + 0.2))^3 of what points see, 0.29.
 constexpr double kSeen = 0.2;
 
-template <int Dim>
-using Nodal = Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>>;
-
-/// Displacements of the nodes from that of the first one, which derivatives do not depend on.
-template <int Dim>
-Nodal<Dim> relative_to_first(const typename CellSet<Dim>::Element& element, const Displacement<Dim>& u) {
-  Nodal<Dim> values = Nodal<Dim>::Zero();
-  const auto nodes = element.nodes();
-  for (int k = 1; k < kQuadraticNodes<Dim>; ++k)
-    if (has_node<Dim>(element.curved, k)) values.col(k) = u.difference(nodes[0], nodes[k]);
-  return values;
-}
-
 /// Adds value * mode * mode^T over modes of the cell's forces to a block, many at a time: a product of matrices.
 template <int Dim>
 class ModalSum {
@@ -53,17 +41,21 @@ class ModalSum {
   static constexpr int kRows = Dim * kQuadraticNodes<Dim>;
 
   explicit ModalSum(Mat<kRows>& block) : block_(block) {}
-  void add(double value, const Mat<Dim>& mode, const Nodal<Dim>& gradients) {
+  template <int LawDim>
+  void add(double value, const Mat<LawDim>& mode, const ElasticSite<Dim, LawDim>& site) {
     if (value == 0) return;
     if (count_ == kBatch) flush();
-    Eigen::Map<Nodal<Dim>>(modes_.col(count_).data()).noalias() = mode * gradients;
+    Eigen::Map<Nodal<Dim>> column(modes_.col(count_).data());
+    column.setZero();
+    site.add_forces(1, mode, column);
     weighted_.col(count_) = value * modes_.col(count_);
     ++count_;
   }
   /// Adds the modes of a density's Hessian at a point, `weight` times.
-  void add(const EigenSystem<Dim>& system, PsdProjection psd, const Nodal<Dim>& gradients, double weight) {
+  template <int LawDim>
+  void add(const EigenSystem<LawDim>& system, PsdProjection psd, const ElasticSite<Dim, LawDim>& site, double weight) {
     for (std::size_t k = 0; k < system.values.size(); ++k)
-      add(weight * projected(system.values[k], psd), system.modes[k], gradients);
+      add(weight * projected(system.values[k], psd), system.modes[k], site);
   }
   void finish() {
     if (count_ == 0) return;
@@ -147,13 +139,16 @@ class NeoHookeanSum {
   double pairs_[Dim * (Dim + 1) / 2][kNodes][kPadded];  ///< of i <= j; columns of b
 };
 
-/// How far a step may go: not past an inversion, and not to where the least Bernstein coefficient of det F over its mean is
-/// less than a tenth of that before (at most of s0).
+/// How far a step may go: not past an inversion or the axis, and not to where the least Bernstein coefficient of det F over
+/// its mean is less than a tenth of that before (at most of s0).
 template <int Dim>
-double free_step(const typename CellSet<Dim>::Element& element, ConstVectorView x, ConstVectorView dx) {
+double free_step(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, ConstVectorView x,
+                 ConstVectorView dx) {
   double t = max_positive_step<Dim>(at_all_nodes<Dim>(element, x), at_all_nodes<Dim>(element, dx));
   if (t < 1) t *= kInversionMargin;
   const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x), way = at_nodes<Dim>(element.nodes(), dx);
+  if constexpr (Dim == 2)
+    if (cells.axisymmetric) t = std::min(t, HoopBarrier(cells, element).free_step(positions, way, kInversionMargin));
   const auto least = [&](double at) { return JacobianBarrier<Dim>(element, positions + at * way).least_ratio(); };
   double at_end = least(t);
   if (at_end >= JacobianBarrier<Dim>::kActive) return t;
@@ -162,17 +157,22 @@ double free_step(const typename CellSet<Dim>::Element& element, ConstVectorView 
   return t;
 }
 
-/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus barrier_density). Feasible: det
-/// F > 0 everywhere in each cell. The energy is infinite in feasible cells, too, where the barrier cannot prove that.
+/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus barrier_density), with the turn
+/// where they are turned. Feasible: det F > 0 everywhere in each cell, and a positive hoop stretch. The energy is infinite
+/// in feasible cells, too, where the barriers cannot prove that.
 template <int Dim>
 class QuadraticElasticity {
  public:
   QuadraticElasticity(const CellSet<Dim>& cells, const std::map<int, Material>& materials, double scale, int degree)
-      : cells_(cells), elements_(cells.curved()), first_(cells.straight().size()), degree_(degree), scale_(scale) {
+      : cells_(cells),
+        elements_(cells.curved()),
+        first_(cells.straight().size()),
+        degree_(degree_with_turn(degree, cells.axisymmetric)),
+        scale_(scale) {
     bool varies = false;
     for (const auto& [body, material] : materials) {
       varies = varies || material.has_varying_moduli();
-      by_body_[body] = cell_moduli<Dim>(cells, material, Vec<Dim>::Zero());
+      by_body_[body] = moduli_at(material, Vec<Dim>::Zero());
     }
     by_element_.reserve(elements_.size());
     for (const Element& element : elements_) by_element_.push_back(&by_body_.at(element.body));
@@ -183,25 +183,25 @@ class QuadraticElasticity {
 
   /// `x` are the positions that `u` leads to.
   double value(const Displacement<Dim>& u, ConstVectorView x) const {
-    return sum_over_cells(u, x, {}, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
-      return elastic_density<Dim>(at, moduli);
-    });
+    return sum_over_cells(u, x, {}, [](const auto& at, const ElasticModuli& moduli) { return elastic_density(at, moduli); });
   }
   void add_gradient(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures,
                     VectorView gradient) const {
     const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
       const Element& element = elements_[e];
-      const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
+      const NodalDisplacements<Dim> displacements(element, u);
       Nodal<Dim> forces = Nodal<Dim>::Zero();
-      const auto& rule = this->rule(e);
-      for (std::size_t q = 0; q < rule.size(); ++q) {
-        const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
-        const DisplacementGradient<Dim> at{displacements * gradients.transpose()};
-        const Mat<Dim> P = elastic_stress<Dim>(at, pressures.in(moduli(e, q), first_ + e, rule[q].weights));
-        forces.noalias() += (scale_ * rule[q].fraction * element.volume) * (P * gradients);
-      }
-      if (const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x)); barrier.is_active())
-        forces += scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e)) * barrier.gradient();
+      for_each_site(e, [&](std::size_t q, const auto& site) {
+        const auto P = elastic_stress(site.displacement_gradient(displacements), moduli(e, q, pressures));
+        site.add_forces(site.weight(scale_), P, forces);
+      });
+      const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
+      if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active())
+        forces += barrier_weight(e) * barrier.gradient();
+      if constexpr (Dim == 2)
+        if (cells_.axisymmetric)
+          if (const HoopBarrier barrier(cells_, element); barrier.is_active(positions))
+            barrier.add_gradient(positions, barrier_weight(e), forces);
       return forces;
     };
     parallel_then_ordered<Nodal<Dim>>(elements_.size(), kCurvedBlock, forces_of,
@@ -213,49 +213,26 @@ class QuadraticElasticity {
   }
   /// The sum of |W| + |P| |G| over points: what value() rounds.
   double size_of_summands(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures) const {
-    return sum_over_cells(u, x, pressures, [](const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
-      return std::abs(elastic_density<Dim>(at, moduli)) + elastic_stress<Dim>(at, moduli).norm() * at.G.norm();
+    return sum_over_cells(u, x, pressures, [](const auto& at, const ElasticModuli& moduli) {
+      return std::abs(elastic_density(at, moduli)) + elastic_stress(at, moduli).norm() * at.G.norm();
     });
   }
   void add_hessian(ConstVectorView x, const PatchPressures<Dim>& pressures, PsdProjection psd, HessianSink& sink) const {
     sink.target().add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
-      const Element& element = elements_[e];
-      const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
-      const auto& rule = this->rule(e);
+      const Nodal<Dim> positions = at_nodes<Dim>(elements_[e].nodes(), x);
       block.setZero();
-      ModalSum<Dim> modes(block);
-      NeoHookeanSum<Dim> exact(nodes);
-      const bool is_neo_hookean = by_element_[e]->law == MaterialLaw::neo_hookean;
-      for (std::size_t q = 0; q < rule.size(); ++q) {
-        const Nodal<Dim> gradients = shape_gradients<Dim>(element, rule[q].weights);
-        const Mat<Dim> F = positions * gradients.transpose();
-        const double weight = scale_ * rule[q].fraction * element.volume;
-        const ElasticModuli here = pressures.in(moduli(e, q), first_ + e, rule[q].weights);
-        if (!is_neo_hookean) {
-          modes.add(elastic_eigensystem<Dim>(F, here), psd, gradients, weight);
-          continue;
-        }
-        exact.add(F, gradients, here.lame, weight);
-        if (psd == PsdProjection::none) continue;
-        const NegativeModes<Dim> negative = neo_hookean_negative_modes<Dim>(F, here.lame);
-        for (int k = 0; k < negative.count; ++k)
-          modes.add(weight * (projected(negative.values[k], psd) - negative.values[k]), negative.modes[k], gradients);
-      }
-      modes.finish();
-      if (is_neo_hookean) exact.add_to(block);
-      if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active()) {
-        const double weight = scale_ * element.volume * stiffness_at_rest<Dim>(moduli_at_barycenter(e));
-        Mat<Dim* kNodes> of_barrier = weight * barrier.hessian();
-        project_block(of_barrier, psd);
-        block += of_barrier;
-      }
+      if (cells_.axisymmetric || by_element_[e]->law != MaterialLaw::neo_hookean)
+        add_modes(e, positions, pressures, psd, block);
+      else
+        add_neo_hookean(e, positions, pressures, psd, nodes, block);
+      add_barriers(e, positions, psd, block);
     });
   }
   double max_step(ConstVectorView x, ConstVectorView dx) const {
     return parallel_min(elements_.size(), kCurvedBlock, [&](std::size_t begin, std::size_t end) {
       double step = 1;
       for (const Element& element : elements_.subspan(begin, end - begin))
-        step = std::min(step, free_step<Dim>(element, x, dx));
+        step = std::min(step, free_step<Dim>(cells_, element, x, dx));
       return step;
     });
   }
@@ -283,7 +260,7 @@ class QuadraticElasticity {
   }
   void limit_step(ConstVectorView x, ConstVectorView dx, StepLimit& least) const {
     for (const Element& element : elements_) {
-      const double t = free_step<Dim>(element, x, dx);
+      const double t = free_step<Dim>(cells_, element, x, dx);
       if (t < least.step) least = {t, "cell", {element.vertices.begin(), element.vertices.end()}};
     }
   }
@@ -295,6 +272,37 @@ class QuadraticElasticity {
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
+  ElasticModuli moduli(std::size_t e, std::size_t point, const PatchPressures<Dim>& pressures) const {
+    return pressures.in(moduli(e, point), first_ + e, rule(e)[point].weights);
+  }
+  ElasticModuli moduli_at(const Material& material, const Vec<Dim>& X) const {
+    if constexpr (Dim == 2)
+      if (cells_.axisymmetric) return elastic_moduli<3>(material, Vec<3>(X[0], X[1], 0));
+    return cell_moduli<Dim>(cells_, material, X);
+  }
+  double volume_of(const Element& element) const {
+    return element.volume * cells_.turn(rest_barycenter<Dim>(cells_, element));
+  }
+  double barrier_stiffness(std::size_t e) const {
+    return cells_.axisymmetric ? stiffness_at_rest<3>(moduli_at_barycenter(e))
+                               : stiffness_at_rest<Dim>(moduli_at_barycenter(e));
+  }
+  double barrier_weight(std::size_t e) const { return scale_ * volume_of(elements_[e]) * barrier_stiffness(e); }
+  /// f(point's number, site) for the points of a cell that have a weight.
+  template <typename F>
+  void for_each_site(std::size_t e, const F& f) const {
+    const Element& element = elements_[e];
+    const auto& rule = this->rule(e);
+    for (std::size_t q = 0; q < rule.size(); ++q) {
+      if constexpr (Dim == 2)
+        if (cells_.axisymmetric) {
+          const ElasticSite<2, 3> site(cells_, element, rule[q]);
+          if (site.turn > 0) f(q, site);
+          continue;
+        }
+      f(q, ElasticSite<Dim, Dim>(cells_, element, rule[q]));
+    }
+  }
   /// Sums share * volume * at_point(G, moduli) over all points, and the barriers.
   template <typename F>
   double sum_over_cells(const Displacement<Dim>& u, ConstVectorView x, const PatchPressures<Dim>& pressures,
@@ -303,18 +311,63 @@ class QuadraticElasticity {
              double sum = 0;
              for (std::size_t e = begin; e < end; ++e) {
                const Element& element = elements_[e];
-               const Nodal<Dim> displacements = relative_to_first<Dim>(element, u);
-               const auto& rule = this->rule(e);
-               for (std::size_t q = 0; q < rule.size(); ++q) {
-                 const Mat<Dim> G = displacements * shape_gradients<Dim>(element, rule[q].weights).transpose();
-                 sum += rule[q].fraction * element.volume *
-                        at_point(DisplacementGradient<Dim>{G}, pressures.in(moduli(e, q), first_ + e, rule[q].weights));
-               }
-               const JacobianBarrier<Dim> barrier(element, at_nodes<Dim>(element.nodes(), x));
-               sum += element.volume * barrier_density<Dim>(barrier, moduli_at_barycenter(e));
+               const NodalDisplacements<Dim> displacements(element, u);
+               for_each_site(e, [&](std::size_t q, const auto& site) {
+                 sum += site.weight(1) * at_point(site.displacement_gradient(displacements), moduli(e, q, pressures));
+               });
+               const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
+               double barriers = 0;
+               if (const JacobianBarrier<Dim> barrier(element, positions); barrier.is_active()) barriers = barrier.value();
+               if constexpr (Dim == 2)
+                 if (cells_.axisymmetric) barriers += HoopBarrier(cells_, element).value(positions);
+               if (barriers != 0) sum += volume_of(element) * (barrier_stiffness(e) * barriers);
              }
              return sum;
            });
+  }
+  void add_modes(std::size_t e, const Nodal<Dim>& positions, const PatchPressures<Dim>& pressures, PsdProjection psd,
+                 Mat<Dim * kNodes>& block) const {
+    ModalSum<Dim> modes(block);
+    for_each_site(e, [&](std::size_t q, const auto& site) {
+      const auto F = site.deformation_gradient(positions);
+      modes.add(elastic_eigensystem(F, moduli(e, q, pressures)), psd, site, site.weight(scale_));
+    });
+    modes.finish();
+  }
+  void add_neo_hookean(std::size_t e, const Nodal<Dim>& positions, const PatchPressures<Dim>& pressures, PsdProjection psd,
+                       NodeSet nodes, Mat<Dim * kNodes>& block) const {
+    ModalSum<Dim> modes(block);
+    NeoHookeanSum<Dim> exact(nodes);
+    const auto& rule = this->rule(e);
+    for (std::size_t q = 0; q < rule.size(); ++q) {
+      const ElasticSite<Dim, Dim> site(cells_, elements_[e], rule[q]);
+      const Mat<Dim> F = site.deformation_gradient(positions);
+      const double weight = site.weight(scale_);
+      const LameParameters lame = moduli(e, q, pressures).lame;
+      exact.add(F, site.gradients, lame, weight);
+      if (psd == PsdProjection::none) continue;
+      const NegativeModes<Dim> negative = neo_hookean_negative_modes<Dim>(F, lame);
+      for (int k = 0; k < negative.count; ++k)
+        modes.add(weight * (projected(negative.values[k], psd) - negative.values[k]), negative.modes[k], site);
+    }
+    modes.finish();
+    exact.add_to(block);
+  }
+  void add_barriers(std::size_t e, const Nodal<Dim>& positions, PsdProjection psd, Mat<Dim * kNodes>& block) const {
+    Mat<Dim* kNodes> of_barriers = Mat<Dim * kNodes>::Zero();
+    const JacobianBarrier<Dim> barrier(elements_[e], positions);
+    bool is_active = barrier.is_active();
+    if (is_active) of_barriers = barrier.hessian();
+    if constexpr (Dim == 2)
+      if (cells_.axisymmetric)
+        if (const HoopBarrier hoop(cells_, elements_[e]); hoop.is_active(positions)) {
+          is_active = true;
+          hoop.add_hessian(positions, of_barriers);
+        }
+    if (!is_active) return;
+    of_barriers *= barrier_weight(e);
+    project_block(of_barriers, psd);
+    block += of_barriers;
   }
   void sample_moduli() {
     varying_.clear();
@@ -324,11 +377,10 @@ class QuadraticElasticity {
     for (std::size_t e = 0; e < by_element_.size(); ++e) {
       const Element& element = elements_[e];
       first_varying_.push_back(varying_.size());
-      at_barycenters_.push_back(
-          cell_moduli<Dim>(cells_, materials_.at(element.body), rest_barycenter<Dim>(cells_, element)));
+      const Material& material = materials_.at(element.body);
+      at_barycenters_.push_back(moduli_at(material, rest_barycenter<Dim>(cells_, element)));
       for (const auto& point : rule(e))
-        varying_.push_back(
-            cell_moduli<Dim>(cells_, materials_.at(element.body), rest_position<Dim>(cells_, element, point.weights)));
+        varying_.push_back(moduli_at(material, rest_position<Dim>(cells_, element, point.weights)));
     }
   }
   /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.

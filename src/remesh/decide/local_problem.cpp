@@ -200,6 +200,7 @@ bool LocalProblem<Dim>::is_removed(FacetId f) const {
 
 template <int Dim>
 void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
+  cells_.axisymmetric = mesh_.is_axisymmetric();
   scratch_.cells.clear(mesh_.cell_slots());
   cells_.elements.reserve(patch.size() + edit_.inserted_cells.size());
   scratch_.curved.clear();
@@ -223,7 +224,7 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
 template <int Dim>
 template <typename Simplex>
 void LocalProblem<Dim>::localize(Simplex& simplex) {
-  if (has_curves(mesh_, edit_)) {
+  if (has_curves(mesh_, edit_) || cells_.axisymmetric) {
     simplex.curved = find_edge_nodes<static_cast<int>(std::tuple_size_v<decltype(simplex.vertices)>) - 1>(
         simplex.vertices, [&](VertexId a, VertexId b) { return node_of(a, b); }, simplex.edge_nodes);
     for (VertexId& node : simplex.edge_nodes) node = local(node);
@@ -234,7 +235,7 @@ void LocalProblem<Dim>::localize(Simplex& simplex) {
 template <int Dim>
 void LocalProblem<Dim>::add_cell(typename CellSet<Dim>::Element cell) {
   localize(cell);
-  if (cell.curved)
+  if (cell.curved && !cells_.axisymmetric)
     scratch_.curved.push_back(cell);
   else
     cells_.add(cell);
@@ -285,6 +286,7 @@ void LocalProblem<Dim>::hold_vertices() {
     }
     const auto tags = is_node ? tags_at(edge) : tags_at(std::array{v.id});
     for (int c = 0; c < Dim; ++c) held[Dim * i + c] = tags[c] != kNoTag;
+    if (cells_.axisymmetric && cells_.rest[i][0] == 0) held[Dim * i] = 1;
   }
   dofs_.hold(held);
 }
@@ -297,7 +299,7 @@ void LocalProblem<Dim>::set_quadrature(ConstVectorView x) {
     QuadratureLevels levels;
     std::size_t next = 0;  // of the edit's cells, of which the curved ones are here
     const auto level_of_next = [&] {
-      while (cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
+      while (!cells_.axisymmetric && cell_after<Dim>(mesh_, edit_, edit_.inserted_cells[next].vertices).edges == 0) ++next;
       return state_.fields.level_of_new_cell(edit_, next++);
     };
     for (const auto& element : cells_.curved())
@@ -357,7 +359,12 @@ void LocalProblem<Dim>::add_history_of_node(InertiaEnergy<Dim>& inertia) const {
   for (const CellId c : edit_.removed_cells) {
     const auto cell = cell_before(mesh_, c);
     const double mass = state_.context.materials.at(mesh_.body(c)).density * mesh_.volume(c);
-    const auto& matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    Mat<kQuadraticNodes<Dim>> matrix = constant_quadratic_mass<Dim>(MassKind::consistent, cell.edges);
+    if (mesh_.is_axisymmetric()) {
+      std::array<Vec<Dim>, Dim + 1> corners;
+      for (int k = 0; k <= Dim; ++k) corners[k] = mesh_.rest(mesh_.cell(c)[k]);
+      matrix = turned_mass<Dim>(MassKind::consistent, cell.edges, corners);
+    }
     const auto n = std::find(cell.nodes.begin(), cell.nodes.end(), node) - cell.nodes.begin();
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
       if (k != n && has_node<Dim>(cell.edges, k)) add(cell.nodes[k], mass * matrix(k, n));
@@ -373,6 +380,7 @@ void LocalProblem<Dim>::add_unrepresented_history(InertiaEnergy<Dim>& inertia) c
   if (edit_.kind == Edit<Dim>::Kind::straighten) return add_history_of_node(inertia);
   // Numberings of the two sides' own: the nodes of removed cells carry the functions as they were.
   TransferCells<Dim> old_side, new_side;
+  old_side.axisymmetric = new_side.axisymmetric = mesh_.is_axisymmetric();
   const auto density = [&](int body) { return state_.context.materials.at(body).density; };
   for (const CellId c : edit_.removed_cells)
     add_to_side<Dim>(mesh_.cell(c), cell_before(mesh_, c), density(mesh_.body(c)), old_side);

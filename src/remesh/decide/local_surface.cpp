@@ -125,6 +125,7 @@ void LocalProblem<Dim>::add_surface() {
 
   using Facet = typename MeshTypes<Dim>::Facet;
   CollisionSurface& surface = storage_->surface;
+  surface.axisymmetric = mesh_.is_axisymmetric();
   surface.edges.clear();
   surface.triangles.clear();
   std::vector<int>& points = scratch_.points;

@@ -37,7 +37,7 @@ double volume_of(double length) {
 template <int Dim>
 double available_energy(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context) {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  if (!is_bounded<Dim>(context) || !std::isfinite(context.coupling)) return kUnknown;
+  if (context.axisymmetric || !is_bounded<Dim>(context) || !std::isfinite(context.coupling)) return kUnknown;
   const auto acceleration = uniform_acceleration(mesh, context.loads);
   if (!acceleration) return kUnknown;
   const Vec<Dim> fall = context.scaling * *acceleration;

@@ -43,7 +43,7 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   x.head(Dim * bodies) = fields.x.head(Dim * bodies);
   for (int o = 0; o < total - bodies; ++o) x.segment<Dim>(Dim * (bodies + o)) = obstacles.x[o];
   std::vector<Vec<Dim>> rest = mesh.rest();
-  CollisionSurface surface = surface_of_facets<Dim>(chords, rest, obstacles);
+  CollisionSurface surface = surface_of_facets<Dim>(chords, rest, obstacles, mesh.is_axisymmetric());
   rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
   surface.closed =
       closed_faces<Dim>(rest, context.contact.dhat, 0, [&](int v) { return v < bodies && mesh.steps_apart(v) == 0; });

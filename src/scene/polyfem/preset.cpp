@@ -58,6 +58,7 @@ void read_preset_problem(const Node& root, const LabelIds& bodies, Setup<Dim>& s
   const Node preset = root["preset_problem"];
   if (!preset.exists()) return;
   if (root.has("boundary_conditions")) preset.fail("it beside boundary_conditions", "one of the two");
+  if (setup.mesh.is_axisymmetric()) preset.fail("it in an axisymmetric scene", "a field in the plane or in space");
   if (!root.document().units.is_si()) preset.fail("it with /units", "SI units");
   // PolyFEM's forces are those of a stiffness that is not turned.
   Document plain = root.document();
