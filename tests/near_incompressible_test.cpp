@@ -2,12 +2,14 @@
 // Whole steps of nearly incompressible bodies whose volume is averaged over patches, and the key that asks for it.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "itr/setup.hpp"
 #include "itr/solver.hpp"
 #include "random_cube.hpp"
 #include "scene_folder.hpp"
+#include "simulation/cell_stress.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {
@@ -57,7 +59,9 @@ TEST(NearIncompressible, CookHasTheErrorsOfCompressibleBodies) {
     const double by_patches = 1 - energy_of(cook(n, order, 0.4999, VolumeForm::patches)) / exact;
     const double pointwise = 1 - energy_of(cook(n, order, 0.4999, VolumeForm::pointwise)) / exact;
     const double at_03 = 1 - energy_of(cook(n, order, 0.3, VolumeForm::pointwise)) / compressible;
-    if (order == 1) EXPECT_LE(std::abs(by_patches), 2 * std::abs(at_03));
+    if (order == 1) {
+      EXPECT_LE(std::abs(by_patches), 2 * std::abs(at_03));
+    }
     EXPECT_LT(std::abs(by_patches), 0.35 * pointwise) << order << ", " << n;
   }
 }
@@ -101,6 +105,35 @@ TEST(NearIncompressible, ReactionsBalanceLoads) {
   });
   EXPECT_NEAR(sum[0], 0, 1e-6);
   EXPECT_NEAR(sum[1], -100, 1e-6);
+}
+
+/// Stresses and energies that output shows are those of the solution: their forces balance the loads.
+TEST(NearIncompressible, StressesOfOutputBalanceLoads) {
+  linear::Registry registry;
+  Simulation<2> simulation(cook(6, 1, 0.4999, VolumeForm::patches), registry);
+  const StepResult result = simulation.advance();
+  ASSERT_TRUE(result.ok);
+  const Mesh<2>& mesh = simulation.state().mesh;
+  const VectorX& x = simulation.state().history.x[0];
+  const CellStress stress = cell_stress(simulation);
+  VectorX forces = VectorX::Zero(x.size());
+  for (const CellId c : mesh.live_cells()) {
+    const auto element = element_of(mesh, c);
+    const Mat<2> F = deformation_gradient<2>(element, x), cauchy = Eigen::Map<const Mat<2>>(&stress.cauchy[4 * c]);
+    const auto by_node = (mesh.volume(c) * F.determinant() * cauchy * F.inverse().transpose() *
+                          barycentric_gradients<2>(element.inverse_edges))
+                             .eval();
+    for (int k = 0; k < 3; ++k) forces.segment<2>(2 * element.vertices[k]) += by_node.col(k);
+  }
+  for (const VertexId v : mesh.live_vertices()) {
+    const bool is_free = mesh.rest(v)[0] > 1e-9 && mesh.rest(v)[0] < 48 - 1e-9;
+    EXPECT_LE(is_free ? forces.segment<2>(2 * v).norm() : 0, 1e-6) << v;
+  }
+  double energy = 0;
+  simulation.observe([&](const FrameView<2>& frame) {
+    for (const CellId c : mesh.live_cells()) energy += mesh.volume(c) * frame.elastic_density[c];
+  });
+  EXPECT_NEAR(energy, result.report.energy.elastic, 1e-12 * energy);
 }
 
 /// A cube between plates that are bonded to it, squeezed by a fifth.

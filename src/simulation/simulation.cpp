@@ -206,7 +206,7 @@ struct Simulation<Dim>::Impl {
   void complete_conditions() {
     const RemeshOptions& remesh = setup.remesh;
     if (!remesh.enabled) return;
-    refuse_unsupported(setup);
+    if (!remeshing_is_complete || setup.lump_mass) refuse_unsupported(setup);
     if (setup.lump_mass) refuse_unsupported(setup, *state);
     if (remeshing_is_complete && remesh.split.acceptance_tolerance) return;
     complete(setup, logger);

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/connected_parts.hpp"
+#include "energy/elastic/law_table.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "long_steps.hpp"
@@ -293,13 +294,14 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
         found.push_back(fmt::format(
             "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
             "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or "
-            "with quadratic elements on a fixed mesh (/space/discr_order: 2)",
+            "with a fixed mesh, where volumes are averaged over patches (/materials/*/volume)",
             name, material.poisson_ratio));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(
           fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
-                      "lock, forces are too large, often several times; {}",
-                      name, material.poisson_ratio, layers, help));
+                      "lock, forces are too large, often several times; {}{}",
+                      name, material.poisson_ratio, layers,
+                      may_average_volume(material, Dim) ? "patches (/materials/*/volume), " : "", help));
     else if (is_thin)
       found.push_back(
           fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends, forces are "
