@@ -71,7 +71,7 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .coefficients = q.coefficients,
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0};
-    pair.force = lets_go_ ? options.adhesion.tangential_coefficient * s.weight * contact.largest_pull()
+    pair.force = lets_go_ ? options.adhesion.tangential_coefficient * s.weight * options.adhesion.lagged_pull()
                           : options.friction_coefficient * s.weight * contact.stiffness() *
                                 -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
