@@ -82,7 +82,7 @@ struct AdhesionOptions {
   /// it.
   bool is_by_step = false;
 
-  /// What sliding is held by, times the coefficient: the largest pull of a pair, or PolyFEM's Y / (2 peak).
+  /// Holds against sliding, times the coefficient: the largest pull of a pair, or PolyFEM's Y / (2 peak).
   double lagged_pull() const { return is_by_step ? strength / (2 * peak) : strength; }
 };
 
