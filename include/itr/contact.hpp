@@ -86,7 +86,6 @@ class ITR_EXPORT ContactEnergy final : public Energy {
   double barrier_first(double squared_distance) const;
   double barrier_second(double squared_distance) const;
   ContactLaw law() const { return law_; }
-  double largest_pull() const;  ///< of adhesion, at its peak, for a pair of weight 1 [N]
   double stiffness() const { return stiffness_; }
   void set_stiffness(double stiffness) { stiffness_ = stiffness; }
   const CollisionSurface& surface() const { return *surface_; }

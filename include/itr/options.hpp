@@ -102,6 +102,9 @@ struct AdhesionOptions {
   /// PolyFEM's way: alpha h^2, which multiplies all other energies of a step, is left out, so that strengths act divided by
   /// it.
   bool is_by_step = false;
+
+  /// Holds against sliding, times the coefficient: the largest pull of a pair, or PolyFEM's Y / (2 peak).
+  double lagged_pull() const { return is_by_step ? strength / (2 * peak) : strength; }
 };
 
 /// Contact and friction (IPC). docs/theory.md, "Contact", has the exact sums.

@@ -143,7 +143,7 @@ std::vector<std::string> KeyTable::names_below(const std::string& pattern) const
 
 std::string KeyTable::place_of(const std::string& key) const {
   for (const auto& [pattern, entry] : entries_)
-    if (entry.key->role != Role::removed && pattern.ends_with("/" + key)) return pattern;
+    if (entry.key->role != Role::removed && entry.key->role != Role::ignored && pattern.ends_with("/" + key)) return pattern;
   return "";
 }
 

@@ -266,12 +266,6 @@ void ContactEnergy<Dim>::renew(const CollisionSurface& surface, const ContactOpt
   slope_ = adhesion.strength / (4 * adhesion.peak * (peak_ - adhesion.reach * adhesion.reach));
 }
 
-/// 2 a (p - r) with a, p and r the slope, the squared peak and the squared reach.
-template <int Dim>
-double ContactEnergy<Dim>::largest_pull() const {
-  return 2 * slope_ * (peak_ - dhat_ * dhat_);
-}
-
 template <int Dim>
 double ContactEnergy<Dim>::barrier(double D) const {
   const double Dhat = dhat_ * dhat_;

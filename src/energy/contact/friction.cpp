@@ -149,9 +149,8 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0,
               .kinetic = kinetic / statics};
-    pair.force =
-        statics * s.weight *
-        (lets_go_ ? contact.largest_pull() : contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance);
+    pair.force = lets_go_ ? held * s.weight * options.adhesion.lagged_pull()
+                          : statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
     pairs_.push_back(pair);
   }
 }
