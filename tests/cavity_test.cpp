@@ -191,9 +191,22 @@ TEST(Cavity, NewtonSystemSolvesAsIfItWereAssembled) {
     ASSERT_TRUE(system.solve_columns(rhs, columns));
     EXPECT_LE((columns.col(0) - expected).norm(), 1e-12);
   }
-  VectorX product(rhs.size());
+  VectorX product(rhs.size()), near = x + VectorX::Constant(x.size(), 1e-3);  // moved as a whole: nothing changes
   system.product()(rhs, product);
   EXPECT_LE((product - H * rhs).norm(), 1e-12);
+  for (const double change : {0.0, 1e-6, 0.1}) {  // solutions begin with the columns of the last one
+    near += change * VectorX::LinSpaced(x.size(), -1, 1);
+    PrescribedMotion none;
+    system.assemble(sum, near, PsdProjection::none, dofs, none, workspace);
+    const MatrixX now = whole_hessian(sum, near);
+    VectorX solution(rhs.size()), all_dofs = VectorX::Zero(x.size());
+    EXPECT_LE(system.solve(0, rhs, {1e-8}, solution).residual, 1e-7);
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (!held[i]) all_dofs[i] = solution[dofs.unknown[i]];
+    const VectorX back = now * all_dofs;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (!held[i]) EXPECT_NEAR(back[i], rhs[dofs.unknown[i]], 1e-6) << change;
+  }
 }
 
 constexpr double kA = 1, kB = 2, kE = 1e6, kNu = 0.3;  ///< radii of a ring, its moduli

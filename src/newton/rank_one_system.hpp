@@ -40,15 +40,28 @@ class RankOneSystem final : public NewtonSystem {
     const linear::Asked anew{asked.residual, asked.loose, asked.if_indefinite};
     linear::SystemReport report = system_.solve(shift, rhs, anew, solution);
     if (solution.size() == 0 || !has_solution(report) || U_.cols() == 0) return report;
-    MatrixX Z(U_.rows(), U_.cols());
-    VectorX of_column(U_.cols());
+    // Columns change little from one Newton iteration to the next: what the last ones leave is solved for.
+    const bool has_guess = shift.value == 0 && guess_.rows() == U_.rows() && guess_.cols() == U_.cols();
+    const Product of_K = has_guess ? system_.product() : Product();
+    MatrixX Z = of_K ? guess_ : MatrixX::Zero(U_.rows(), U_.cols());
+    VectorX of_column(U_.cols()), left(U_.rows()), more(U_.rows());
     for (Eigen::Index k = 0; k < U_.cols(); ++k) {
-      const linear::SystemReport of = system_.solve(shift, U_.col(k), anew, Z.col(k));
+      left.setZero();
+      if (of_K) of_K(Z.col(k), left);
+      left = U_.col(k) - left;
+      of_column[k] = left.norm();
+      const double part = of_column[k] / U_.col(k).norm();
+      if (!(part > asked.loose)) continue;
+      const linear::Asked rest{std::min(kLeastDigits, asked.residual / part), std::min(kLeastDigits, asked.loose / part),
+                               asked.if_indefinite};
+      const linear::SystemReport of = system_.solve(shift, left, rest, more);
       if (!has_solution(of)) return of;
-      of_column[k] = of.residual * U_.col(k).norm();
+      Z.col(k) += more;
+      of_column[k] *= of.residual;
       if (report.definiteness == linear::Definiteness::unknown) report.definiteness = of.definiteness;
     }
     set_columns(std::move(Z));
+    if (shift.value == 0) guess_ = Z_;
     const VectorX weights = correct(solution);
     if (rhs.norm() > 0) report.residual += weights.cwiseAbs().dot(of_column) / rhs.norm();
     return report;
@@ -86,6 +99,8 @@ class RankOneSystem final : public NewtonSystem {
   double curvature_of(const Shift& shift, ConstVectorView step) const override { return system_.curvature_of(shift, step); }
 
  private:
+  static constexpr double kLeastDigits = 0.1;  ///< residual of what a guess leaves, at most
+
   static bool has_solution(const linear::SystemReport& report) {
     return report.outcome == linear::Outcome::ok || report.outcome == linear::Outcome::not_converged;
   }
@@ -109,6 +124,7 @@ class RankOneSystem final : public NewtonSystem {
 
   NewtonSystem& system_;
   MatrixX U_;                           ///< by unknown, with the roots of the factors
+  MatrixX guess_;                       ///< Z of the last solve without a shift
   MatrixX Z_;                           ///< K^-1 U, with the shift of the last solve; empty: not known
   Eigen::PartialPivLU<MatrixX> small_;  ///< of 1 + U^T K^-1 U
 };
