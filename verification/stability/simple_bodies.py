@@ -88,7 +88,7 @@ class Draw:
             mu, bulk = self.E / (2 * (1 + self.nu)), self.E / (3 * (1 - 2 * self.nu))
             material = {"id": 1, "type": law, "c1": 0.4 * mu, "c2": 0.1 * mu, "rho": self.rho}
             material |= {"k": bulk} if law == "MooneyRivlin" else {"c3": 0.05 * mu, "d1": bulk / 2}
-        return material | {"volume": "pointwise"}  # which the reference has
+        return material
 
     def draw_units(self):
         """A consistent system, in which the numbers stay what they are; not one that makes diamonds of jelly."""

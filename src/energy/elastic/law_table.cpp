@@ -194,9 +194,9 @@ VolumeResponse volume_response(const LawSum& sum, double log_J) {
   return at.volume();
 }
 
-/// As in plane strain and in 3D nu = 0.45 has; a law that is the sum of two such parts, lambda / mu = 9.
+/// As in plane strain and in 3D nu = 0.48 has; a law that is the sum of two such parts, lambda / mu = 24.
 bool is_nearly_incompressible(const Material& material, int dim) {
-  constexpr double kRatio = 9 * (1 - 1e-9);
+  constexpr double kRatio = 24 * (1 - 1e-9);
   if (!may_average_volume(material, dim)) return false;
   if (const LawSum* sum = sum_of(material)) {
     const RestModuli rest = rest_moduli(*sum);

@@ -85,7 +85,7 @@ VolumeResponse volume_response(const LawSum& sum, double log_J);
 
 /// Whether a material has constant moduli and a law with a part U(J), of which J may be averaged (VolumeForm::patches).
 bool may_average_volume(const Material& material, int dim);
-/// Whether it may, and point by point would lock linear elements: from nu = 0.45 on.
+/// Whether it may, and point by point would lock linear elements: from nu = 0.48 on.
 bool is_nearly_incompressible(const Material& material, int dim);
 
 /// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
