@@ -19,7 +19,7 @@ namespace {
 // Where one solver overtakes another, from verification/solvers/results.csv.
 constexpr int kDenseBelow = 60;
 constexpr const char* kTasks = "cholmod:tasks";
-constexpr double kContributions = 0.7;  ///< memory beside the factor that cholmod:tasks takes, over the factor
+constexpr double kContributions = 0.7;       ///< memory beside the factor that cholmod:tasks takes, over the factor
 constexpr std::size_t kTasksAbove = 10'000;  // nonzeros of the lower triangle, from which solves are as fast as eigen:ldlt's
 constexpr std::size_t kSupernodalAbove2d = 60'000, kSupernodalAbove3d = 20'000;  // nonzeros of the lower triangle
 
