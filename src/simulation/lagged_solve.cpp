@@ -209,6 +209,13 @@ class LaggedSolve {
       }
     }
   }
+  /// The largest coordinate of what may move [m]; obstacles may reach much farther.
+  double farthest_unknown() const {
+    double farthest = 0;
+    for (Eigen::Index i = 0; i < base_.size(); ++i)
+      if (dofs_.unknown[i] != kNone) farthest = std::max(farthest, std::abs(base_[i]));
+    return farthest;
+  }
   /// Says where friction has fallen from static to kinetic within the step, which then depends on its length.
   void tell_of_jump(const VectorX& x, NewtonSummary& summary) const {
     const VectorX& v = problem_.start_velocity_;
@@ -235,7 +242,7 @@ class LaggedSolve {
     NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
                         .on_iteration = setup_.on_iteration,
                         .must_be_minimum = !terms_.has_inertia,
-                        .position_round_off = std::numeric_limits<double>::epsilon() * base_.cwiseAbs().maxCoeff()};
+                        .position_round_off = std::numeric_limits<double>::epsilon() * farthest_unknown()};
     if (step_to_start.size() > 0) {
       extras.gradient_of_step = VectorX::Zero(x.size());
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
