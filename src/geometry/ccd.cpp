@@ -151,7 +151,8 @@ double time_apart(const MovingPair<Dim>& pair, double gap, double t, double& rea
 /// apart along a line is never more than their distance, whatever the line: without `by_speed` round-off in distances, which
 /// is large where primitives are slivers, misses nothing. `t` goes on from where the distance is above `gap` to where it
 /// hardly is, or to 1 where it stays above. Pairs that slide and turn at a small gap would creep: there a longer step is one
-/// over which their lines or planes stay apart.
+/// over which their lines or planes stay apart. In 2D that finds few more pairs that pass, and a squeezed ball took 978
+/// iterations by it instead of 841.
 template <int Dim>
 double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool by_speed, double t, int iterations) {
   double step = 0, reach = 1;
@@ -165,7 +166,7 @@ double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool
     if (!(free.apart > gap) && !by_speed) return t;
     step = kSafe * std::max(by_speed ? (now - gap) / sizes.speed : 0.0, free.apart > gap ? free.safe_time : 0.0);
     if (t + step >= 1) return 1;
-    step = std::max(step, time_apart(pair, gap + kRoundOff * sizes.farthest, t, reach, 2 * step));
+    if (by_speed || Dim == 3) step = std::max(step, time_apart(pair, gap + kRoundOff * sizes.farthest, t, reach, 2 * step));
     t += step;
     if (t >= 1) return 1;
   }
