@@ -15,6 +15,7 @@
 
 #include "file_parts.hpp"
 #include "mesh/refine.hpp"
+#include "readers.hpp"
 #include "selection.hpp"
 #include "selection_file.hpp"
 #include "transformation.hpp"
@@ -264,7 +265,7 @@ void collect(const Node& geometry, const Mesh<Dim>& mesh, const Box<Dim>& box, K
 template <int Dim>
 void put_on_axis(const Node& geometry, std::vector<Vec<Dim>>& points) {
   constexpr double kRoundOff = 1e-12;  // of the largest coordinate
-  if (Dim != 2 || !Node(geometry.document())["axisymmetric"].boolean(false)) return;
+  if (Dim != 2 || !is_axisymmetric(geometry)) return;
   double size = 0;
   for (const Vec<Dim>& X : points) size = std::max(size, X.template lpNorm<Eigen::Infinity>());
   for (std::size_t v = 0; v < points.size(); ++v) {

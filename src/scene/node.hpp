@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,13 +16,17 @@ namespace itr::scene {
 
 using Json = nlohmann::json;
 
+class Interpreters;
+std::shared_ptr<Interpreters> make_interpreters();
+
 /// A scene after merging: what all pointers point into.
 struct Document {
   std::filesystem::path file;  ///< the outermost scene file
   std::filesystem::path root;  ///< effective root_path
   Json json;
-  Units units{};                        ///< of its numbers
-  std::vector<std::string> warnings{};  ///< of where files of `common` were found
+  Units units{};                                                     ///< of its numbers
+  std::vector<std::string> warnings{};                               ///< of where files of `common` were found
+  std::shared_ptr<Interpreters> interpreters = make_interpreters();  ///< of the Python files that values name
 
   /// Absolute, else relative to `root`, else (if only there is such a file) to the working directory. Unlike in
   /// PolyFEM the root comes first: what a scene means must not depend on where the command is run.

@@ -64,6 +64,9 @@ bool read_lump_mass(const Node& root);
 std::map<int, int> read_order(const Node& root, const LabelIds& labels, const std::set<int>& bodies);
 int read_quadrature_degree(const Node& root);
 
+/// Whether the scene of this place is axisymmetric.
+bool is_axisymmetric(const Node& node);
+
 // `materials` of a scene (docs/theory.md, "Materials").
 
 /// By body id. InputError for a body of the mesh without one, and for moduli or densities out of range; those that vary are

@@ -15,6 +15,8 @@
 
 namespace itr::scene {
 
+bool is_axisymmetric(const Node& node) { return Node(node.document())["axisymmetric"].boolean(false); }
+
 namespace {
 
 /// Shortest edge of the surfaces that can touch: the bodies' boundary or its proxy, and the obstacles.
@@ -73,9 +75,9 @@ Sets sets_of(const Geometry<Dim>& geometry) {
 
 template <int Dim>
 void read_axisymmetric(const Node& root, Mesh<Dim>& mesh) {
-  const bool is_axisymmetric = root["axisymmetric"].boolean(false);
-  if (is_axisymmetric && Dim == 3) root["axisymmetric"].fail("true in a 3D scene", "it in 2D only");
-  if constexpr (Dim == 2) mesh.set_axisymmetric(is_axisymmetric);
+  const bool is_asked = is_axisymmetric(root);
+  if (is_asked && Dim == 3) root["axisymmetric"].fail("true in a 3D scene", "it in 2D only");
+  if constexpr (Dim == 2) mesh.set_axisymmetric(is_asked);
 }
 
 /// All but geometry and the contact that comes with it.
@@ -234,7 +236,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
     warn_of_working_folder(name.pointer(), name.string(""), document.root, document.file, scene.warnings);
   });
   const int dimension = find_dimension(geometries, files);
-  document.units.dim = root["axisymmetric"].boolean(false) ? 3 : dimension;  // nothing is by thickness
+  document.units.dim = is_axisymmetric(root) ? 3 : dimension;  // nothing is by thickness
   scene.output = read_output(root);
   if (dimension == 2)
     scene.setup = read_setup<2>(root, geometries, files, scene.parts, scene.warnings);

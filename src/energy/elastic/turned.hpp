@@ -78,8 +78,8 @@ struct ElasticSite {
 /// Keeps the radius of a turned cell above zero where it is above zero at rest. It is at least the least of its Bernstein
 /// coefficients, at vertices and on curved edges; with their ratios s_k to those at rest, of mean m, the barrier is
 ///   1/16 sum over k of phi(s_k / m),   phi that of JacobianBarrier.
-/// It is infinite where a coefficient is not positive, and acts where the cell's quadrature sees little of what a hole does
-/// that closes on the axis.
+/// The barrier is infinite where a coefficient is not positive. Quadrature alone sees little of a hole that closes on the
+/// axis.
 class HoopBarrier {
  public:
   HoopBarrier(const CellSet<2>& cells, const CellSet<2>::Element& element);

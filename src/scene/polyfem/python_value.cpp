@@ -102,17 +102,21 @@ class Interpreter {
   std::mutex mutex_;
 };
 
-/// The interpreter of a file, which all values that name it share.
-std::shared_ptr<Interpreter> interpreter_of(const std::string& path) {
-  static std::mutex mutex;
-  static std::map<std::string, std::weak_ptr<Interpreter>> all;
-  const std::lock_guard lock(mutex);
-  std::shared_ptr<Interpreter> found = all[path].lock();
-  if (!found) all[path] = found = std::make_shared<Interpreter>(path);
-  return found;
-}
-
 }  // namespace
+
+/// One by file, which all values of a scene that name the file share.
+class Interpreters {
+ public:
+  std::shared_ptr<Interpreter> of(const std::string& path) {
+    std::shared_ptr<Interpreter>& found = by_path_[path];
+    if (!found) found = std::make_shared<Interpreter>(path);
+    return found;
+  }
+
+ private:
+  std::map<std::string, std::shared_ptr<Interpreter>> by_path_;
+};
+std::shared_ptr<Interpreters> make_interpreters() { return std::make_shared<Interpreters>(); }
 
 bool is_python_value(const Json& json) { return json.is_object() && json.contains("file_name"); }
 
@@ -126,7 +130,7 @@ std::function<double(double x, double y, double z, double t)> read_python_value(
   if (name.empty() ||
       name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") != std::string::npos)
     node["function_name"].fail("the name of a function");
-  const std::shared_ptr<Interpreter> interpreter = interpreter_of(path);
+  const std::shared_ptr<Interpreter> interpreter = node.document().interpreters->of(path);
   if (!interpreter->has_begun()) node.fail(abbreviate(node.json()) + ", but python3 does not run", "python3 on the path");
   const InputError::Parts parts{node.document().file.string(), node.pointer(), abbreviate(node.json()), "a number"};
   return [=](double x, double y, double z, double t) {
