@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "energy/cone_sum.hpp"
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
-
+#include "geometry/cofactors.hpp"
+#include "geometry/measures.hpp"
 #include "project_block.hpp"
 
 namespace itr {
 
 namespace {
-
-/// Signed volume of the simplex from the origin to the corners.
-template <int Dim>
-double cone_volume(const Mat<Dim>& p) {
-  return p.determinant() / (Dim == 2 ? 2 : 6);
-}
 
 Mat<4> cone_hessian(const Mat<2>&) {
   Mat<4> hessian = Mat<4>::Zero();
@@ -40,16 +33,8 @@ Mat<9> cone_hessian(const Mat<3>& p) {
 
 }  // namespace
 
-Mat<2> cone_gradient(const Mat<2>& p) {
-  Mat<2> gradient;
-  gradient << p(1, 1), -p(1, 0), -p(0, 1), p(0, 0);
-  return gradient / 2;
-}
-Mat<3> cone_gradient(const Mat<3>& p) {
-  Mat<3> gradient;
-  for (int k = 0; k < 3; ++k) gradient.col(k) = p.col((k + 1) % 3).cross(p.col((k + 2) % 3)) / 6;
-  return gradient;
-}
+Mat<2> cone_gradient(const Mat<2>& p) { return cofactors(p) / 2; }
+Mat<3> cone_gradient(const Mat<3>& p) { return cofactors(p) / 6; }
 
 template <int Dim>
 CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, Dim>& l) {
@@ -65,9 +50,10 @@ CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, D
 
 template <int Dim>
 double ConeSum<Dim>::add_value(ConstVectorView x, double sum) const {
-  for (const Facet& facet : facets_) sum += facet.pressure * cone_volume<Dim>(corners(facet, x));
-  for_each_cone(
-      x, [&](const CurvedFacet&, double pressure, const auto&, const Corners& p) { sum += pressure * cone_volume<Dim>(p); });
+  for (const Facet& facet : facets_) sum += facet.pressure * simplex_volume<Dim>(corners(facet, x));
+  for_each_cone(x, [&](const CurvedFacet&, double pressure, const auto&, const Corners& p) {
+    sum += pressure * simplex_volume<Dim>(p);
+  });
   for_each_turned(x,
                   [&](const CurvedFacet&, double pressure, const TurnedPoint& point) { sum += pressure * point.volume(); });
   return sum;

@@ -151,8 +151,8 @@ double time_apart(const MovingPair<Dim>& pair, double gap, double t, double& rea
 /// apart along a line is never more than their distance, whatever the line: without `by_speed` round-off in distances, which
 /// is large where primitives are slivers, misses nothing. `t` goes on from where the distance is above `gap` to where it
 /// hardly is, or to 1 where it stays above. Pairs that slide and turn at a small gap would creep: there a longer step is one
-/// over which their lines or planes stay apart. In 2D that finds few more pairs that pass, and a squeezed ball took 978
-/// iterations by it instead of 841.
+/// over which their lines or planes stay apart. In 2D only `by_speed`: there it finds few more pairs
+/// that pass.
 template <int Dim>
 double advance(const MovingPair<Dim>& pair, const Sizes& sizes, double gap, bool by_speed, double t, int iterations) {
   double step = 0, reach = 1;

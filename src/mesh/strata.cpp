@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/check.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "mesh/rest_box.hpp"
 
 namespace itr {
@@ -16,11 +17,6 @@ namespace {
 /// Beside the tolerance by the size of the mesh, the sine of the angle between facets or edges that count as one plane or
 /// line: what keeps small facets from counting as flat whatever they do.
 constexpr double kAngle = 1e-6;
-
-template <std::size_t N>
-bool holds(const std::array<int, N>& ids, int v) {
-  return std::find(ids.begin(), ids.end(), v) != ids.end();
-}
 
 /// Area-weighted normal of a facet: of its length in 2D, twice its area in 3D.
 Vec<2> facet_normal(const Mesh<2>& mesh, const std::array<int, 2>& f) {
@@ -59,12 +55,7 @@ std::vector<InputSheet<Dim>> find_sheets(const Mesh<Dim>& mesh) {
     sheets.back().neighbours.fill(kNone);
   };
   for (const FacetId f : mesh.live_facets()) {
-    const auto& facet = mesh.facet(f);
-    const auto around = mesh.cells_of(facet[0]);
-    const auto cell = std::find_if(around.begin(), around.end(), [&](CellId c) {
-      return std::all_of(facet.begin(), facet.end(), [&](int v) { return holds(mesh.cell(c), v); });
-    });
-    add(facet, {0, mesh.body(*cell), mesh.facet_tag(f)}, f);
+    add(mesh.facet(f), {0, mesh.body(cell_of_facet(mesh, f)), mesh.facet_tag(f)}, f);
   }
   std::vector<char> between(mesh.node_slots());
   for (VertexId v = 0; v < mesh.node_slots(); ++v) between[v] = mesh.is_on_interface(v);

@@ -96,8 +96,9 @@ class Convergence {
     if (begins_elsewhere() && step.norm > kNothing * task_.norms.of_step(task_.extras.step_to_start)) return false;
     return step.norm < options.step_tolerance;
   }
-  /// The one rule for round-off: a step that promises less than the energy resolves may still lower the gradient, but not
-  /// below the gradient's own round-off.
+  /// The one rule for round-off: a step that promises less than the energy resolves, or moves less than positions resolve,
+  /// may still lower the gradient. Such steps end the solve where the gradient is its own round-off, unless the first one
+  /// moves more than positions' round-off, or where it does not shrink any more.
   bool has_ceased_to_improve(const Step& step) {
     const std::optional<double> seen = task_.extras.position_round_off;
     const bool is_hidden = seen && step.direction.cwiseAbs().maxCoeff() <= kFloor * *seen;

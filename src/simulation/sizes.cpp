@@ -9,21 +9,9 @@
 #include <limits>
 #include <vector>
 
+#include "mesh/cell_of_facet.hpp"
+
 namespace itr {
-
-namespace {
-
-template <int Dim>
-int body_at(const Mesh<Dim>& mesh, const typename Mesh<Dim>::Facet& facet) {
-  for (const CellId c : mesh.cells_of(facet[0])) {
-    const auto& cell = mesh.cell(c);
-    const auto has = [&](int v) { return std::find(cell.begin(), cell.end(), v) != cell.end(); };
-    if (std::all_of(facet.begin(), facet.end(), has)) return mesh.body(c);
-  }
-  return mesh.body(mesh.cells_of(facet[0]).front());
-}
-
-}  // namespace
 
 template <int Dim>
 EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
@@ -57,7 +45,7 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
     ++cells[mesh.body(c)];
     for (const int v : mesh.cell(c)) boxes[mesh.body(c)].extend(mesh.rest(v));
   }
-  for (const FacetId f : mesh.live_facets()) sizes[body_at<Dim>(mesh, mesh.facet(f))].surface += facet_measure(mesh, f);
+  for (const FacetId f : mesh.live_facets()) sizes[mesh.body(cell_of_facet(mesh, f))].surface += facet_measure(mesh, f);
   for (auto& [body, size] : sizes) {
     size.diagonal = boxes[body].diagonal().norm();
     size.thickness = size.surface > 0 ? 2 * size.volume / size.surface : size.diagonal;
@@ -95,7 +83,7 @@ std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
     if (turn > kLargestTurn) continue;
     const double length = Dim == 2 ? 1 : (mesh.rest(corner.front()) - mesh.rest(corner.back())).norm();
     const double height = (a.norm() + b.norm()) / 2 / length;  // of the facets above the corner
-    lost[body_at<Dim>(mesh, mesh.facet(facets[0]))] += length * height * height * turn / 12;
+    lost[mesh.body(cell_of_facet(mesh, facets[0]))] += length * height * height * turn / 12;
   }
   for (const auto& [body, size] : body_sizes(mesh)) lost[body] /= size.volume;
   return lost;

@@ -10,6 +10,7 @@
 #include "energy/elastic/point.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/predicates.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "sizes.hpp"
 
 namespace itr {
@@ -44,19 +45,14 @@ struct Inside {
 template <int Dim>
 Inside<Dim> inside_of(const Mesh<Dim>& mesh, FacetId f) {
   const auto& facet = mesh.facet(f);
-  const auto has = [](const auto& ids, int v) { return std::find(ids.begin(), ids.end(), v) != ids.end(); };
   Inside<Dim> inside{0, Vec<Dim>::Zero(), Vec<Dim>::Zero()};
   for (const int v : facet) inside.center += mesh.rest(v) / Dim;
-  for (const CellId c : mesh.cells_of(facet[0])) {
-    const auto& cell = mesh.cell(c);
-    if (!std::all_of(facet.begin(), facet.end(), [&](int v) { return has(cell, v); })) continue;
-    const int apex = *std::find_if(cell.begin(), cell.end(), [&](int v) { return !has(facet, v); });
-    // The gradient of the apex' barycentric coordinate is normal to the facet.
-    inside.body = mesh.body(c);
-    const Mat<Dim>& inverse = mesh.inverse_rest_edges(c);
-    const auto gradients = barycentric_gradients<Dim>(inverse);
-    inside.inward = gradients.col(std::find(cell.begin(), cell.end(), apex) - cell.begin()).normalized();
-  }
+  const CellId c = cell_of_facet(mesh, f);
+  const auto& cell = mesh.cell(c);
+  const auto apex = std::ranges::find_if(cell, [&](VertexId v) { return !holds(facet, v); });
+  // The gradient of the apex' barycentric coordinate is normal to the facet.
+  inside.body = mesh.body(c);
+  inside.inward = barycentric_gradients<Dim>(mesh.inverse_rest_edges(c)).col(apex - cell.begin()).normalized();
   return inside;
 }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "energy/contact/pairs.hpp"
+#include "mesh/cell_of_facet.hpp"
 
 namespace itr {
 
@@ -97,14 +98,8 @@ template <int Dim>
 std::uint64_t friction_sides_of_node(const Mesh<Dim>& mesh, VertexId node, const std::vector<FrictionPair>& pairs) {
   std::uint64_t sides = 0;
   const auto add = [&](FacetId f) {
-    const auto& facet = mesh.facet(f);
-    const auto holds = [&](CellId c, VertexId v) { return std::ranges::find(mesh.cell(c), v) != mesh.cell(c).end(); };
-    for (const CellId c : mesh.cells_of(facet[0])) {
-      if (!std::ranges::all_of(facet, [&](VertexId v) { return holds(c, v); })) continue;
-      sides |= sides_of(pairs, [&](const FrictionSide& side) {
-        return has(side.bodies, mesh.body(c)) || has(side.surfaces, mesh.facet_tag(f));
-      });
-    }
+    const int body = mesh.body(cell_of_facet(mesh, f)), tag = mesh.facet_tag(f);
+    sides |= sides_of(pairs, [&](const FrictionSide& side) { return has(side.bodies, body) || has(side.surfaces, tag); });
   };
   if (const EdgeKey edge = mesh.edge_of_node(node); edge[0] != kNone)
     std::ranges::for_each(mesh.facets_of_edge(edge), add);

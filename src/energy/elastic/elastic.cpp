@@ -199,14 +199,15 @@ PatchPressures<Dim> ElasticEnergy<Dim>::pressures(const Displacement<Dim>& u) co
 /// Stress and displacement gradient both round: W by epsilon of itself, and by epsilon |P| |G|.
 template <int Dim>
 double ElasticEnergy<Dim>::round_off_of(const Displacement<Dim>& u, ConstVectorView x) const {
-  const PatchPressures<Dim> pressures = this->pressures(u);
+  const std::vector<double> changes = patched_ ? patched_->changes(u) : std::vector<double>();
+  const PatchPressures<Dim> pressures = patched_ ? patched_->pressures(changes) : PatchPressures<Dim>{};
   const double straight = sum_over_elements([&](std::size_t e) {
     const auto& element = cells_.elements[e];
     const auto at = displacement_gradient<Dim>(element, u);
-    const ElasticModuli here = pressures.in_straight(moduli(e), e);
+    const PatchedLaw here = pressures.in_straight(moduli(e), e);
     return element.volume * (std::abs(elastic_density<Dim>(at, here)) + elastic_stress<Dim>(at, here).norm() * at.G.norm());
   });
-  const double patches = patched_ ? std::abs(patched_->value(patched_->changes(u))) : 0;
+  const double patches = patched_ ? std::abs(patched_->value(changes)) : 0;
   return kEpsilon * (patches + (curved_ ? straight + curved_->size_of_summands(u, x, pressures) : straight));
 }
 
@@ -278,7 +279,8 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const auto at = displacement_gradient<Dim>(element, u);
     const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
     const double weight = scale_ * element.volume;
-    const ElasticModuli here = pressures.in_straight(moduli(e), e);
+    const PatchedLaw law = pressures.in_straight(moduli(e), e);
+    const ElasticModuli& here = law;
     if (here.law == MaterialLaw::neo_hookean) {
       exact_block<Dim>(at, gradients, here.lame, weight, block);
       if (psd != PsdProjection::none)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "patched_volume.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <utility>
 
@@ -9,6 +8,7 @@
 #include "energy/energy.hpp"
 #include "fem/hessian_sink.hpp"
 #include "fem/volume_patches.hpp"
+#include "geometry/cofactors.hpp"
 #include "strain.hpp"
 
 namespace itr {
@@ -16,18 +16,6 @@ namespace itr {
 namespace {
 
 constexpr std::size_t kElements = 256, kPatches = 64;  ///< of a task
-
-/// Derivatives of det F by F: the columns of F^-T times det F.
-Mat<2> cofactors(const Mat<2>& F) {
-  Mat<2> C;
-  C << F(1, 1), -F(1, 0), -F(0, 1), F(0, 0);
-  return C;
-}
-Mat<3> cofactors(const Mat<3>& F) {
-  Mat<3> C;
-  C << F.col(1).cross(F.col(2)), F.col(2).cross(F.col(0)), F.col(0).cross(F.col(1));
-  return C;
-}
 
 template <int Dim>
 double volume_change(const Mat<Dim>& G) {

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "energy/elastic/laws.hpp"
@@ -15,6 +16,18 @@
 #include "fem/quadrature.hpp"
 
 namespace itr {
+
+/// A law that is kept elsewhere, or a copy of it with the pressure of patches.
+class PatchedLaw {
+ public:
+  explicit PatchedLaw(const ElasticModuli& moduli) : moduli_(moduli) {}
+  void set_pressure(double pressure) { copy_.emplace(moduli_).set_pressure(pressure); }
+  operator const ElasticModuli&() const { return copy_ ? *copy_ : moduli_; }
+
+ private:
+  const ElasticModuli& moduli_;
+  std::optional<ElasticModuli> copy_;  ///< empty: no patch takes part
+};
 
 /// dU/dJ by patch; without patches none.
 template <int Dim>
@@ -30,16 +43,18 @@ struct PatchPressures {
         sum += patches->weight(static_cast<int>(element), part, weights) * values[patch];
     return sum;
   }
-  /// The law there.
-  ElasticModuli in(ElasticModuli moduli, std::size_t element, const std::array<double, Dim + 1>& weights) const {
-    if (patches) moduli.set_pressure(at(element, weights));
-    return moduli;
+  /// The law there; `moduli` must outlive it.
+  PatchedLaw in(const ElasticModuli& moduli, std::size_t element, const std::array<double, Dim + 1>& weights) const {
+    PatchedLaw law(moduli);
+    if (patches) law.set_pressure(at(element, weights));
+    return law;
   }
-  ElasticModuli in_straight(ElasticModuli moduli, std::size_t element) const {
+  PatchedLaw in_straight(const ElasticModuli& moduli, std::size_t element) const {
+    PatchedLaw law(moduli);
     if (patches)
       if (const int patch = patches->patch_of[element][VolumePatches<Dim>::kLeft]; patch != kNone)
-        moduli.set_pressure(values[patch]);
-    return moduli;
+        law.set_pressure(values[patch]);
+    return law;
   }
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -157,7 +158,7 @@ double free_step(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element
   return t;
 }
 
-/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus barrier_density), with the turn
+/// scale * sum over curved elements of rest volume * (sum over points of share * W(F), plus the barriers), with the turn
 /// where they are turned. Feasible: det F > 0 everywhere in each cell, and a positive hoop stretch. The energy is infinite
 /// in feasible cells, too, where the barriers cannot prove that.
 template <int Dim>
@@ -192,7 +193,7 @@ class QuadraticElasticity {
       const NodalDisplacements<Dim> displacements(element, u);
       Nodal<Dim> forces = Nodal<Dim>::Zero();
       for_each_site(e, [&](std::size_t q, const auto& site) {
-        const auto P = elastic_stress(site.displacement_gradient(displacements), moduli(e, q, pressures));
+        const auto P = elastic_stress(site.displacement_gradient(displacements), law(e, q, site, pressures));
         site.add_forces(site.weight(scale_), P, forces);
       });
       const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
@@ -272,8 +273,10 @@ class QuadraticElasticity {
   const ElasticModuli& moduli(std::size_t e, std::size_t point) const {
     return varying_.empty() ? *by_element_[e] : varying_[first_varying_[e] + point];
   }
-  ElasticModuli moduli(std::size_t e, std::size_t point, const PatchPressures<Dim>& pressures) const {
-    return pressures.in(moduli(e, point), first_ + e, rule(e)[point].weights);
+  template <int LawDim>
+  PatchedLaw law(std::size_t e, std::size_t point, const ElasticSite<Dim, LawDim>& site,
+                 const PatchPressures<Dim>& pressures) const {
+    return pressures.in(moduli(e, point), first_ + e, site.point.weights);
   }
   ElasticModuli moduli_at(const Material& material, const Vec<Dim>& X) const {
     if constexpr (Dim == 2)
@@ -313,7 +316,7 @@ class QuadraticElasticity {
                const Element& element = elements_[e];
                const NodalDisplacements<Dim> displacements(element, u);
                for_each_site(e, [&](std::size_t q, const auto& site) {
-                 sum += site.weight(1) * at_point(site.displacement_gradient(displacements), moduli(e, q, pressures));
+                 sum += site.weight(1) * at_point(site.displacement_gradient(displacements), law(e, q, site, pressures));
                });
                const Nodal<Dim> positions = at_nodes<Dim>(element.nodes(), x);
                double barriers = 0;
@@ -330,7 +333,7 @@ class QuadraticElasticity {
     ModalSum<Dim> modes(block);
     for_each_site(e, [&](std::size_t q, const auto& site) {
       const auto F = site.deformation_gradient(positions);
-      modes.add(elastic_eigensystem(F, moduli(e, q, pressures)), psd, site, site.weight(scale_));
+      modes.add(elastic_eigensystem(F, law(e, q, site, pressures)), psd, site, site.weight(scale_));
     });
     modes.finish();
   }
@@ -343,7 +346,8 @@ class QuadraticElasticity {
       const ElasticSite<Dim, Dim> site(cells_, elements_[e], rule[q]);
       const Mat<Dim> F = site.deformation_gradient(positions);
       const double weight = site.weight(scale_);
-      const LameParameters lame = moduli(e, q, pressures).lame;
+      const PatchedLaw law = this->law(e, q, site, pressures);
+      const LameParameters& lame = static_cast<const ElasticModuli&>(law).lame;
       exact.add(F, site.gradients, lame, weight);
       if (psd == PsdProjection::none) continue;
       const NegativeModes<Dim> negative = neo_hookean_negative_modes<Dim>(F, lame);
@@ -354,20 +358,18 @@ class QuadraticElasticity {
     exact.add_to(block);
   }
   void add_barriers(std::size_t e, const Nodal<Dim>& positions, PsdProjection psd, Mat<Dim * kNodes>& block) const {
-    Mat<Dim* kNodes> of_barriers = Mat<Dim * kNodes>::Zero();
-    const JacobianBarrier<Dim> barrier(elements_[e], positions);
-    bool is_active = barrier.is_active();
-    if (is_active) of_barriers = barrier.hessian();
+    std::optional<Mat<Dim * kNodes>> of_barriers;
+    if (const JacobianBarrier<Dim> barrier(elements_[e], positions); barrier.is_active()) of_barriers = barrier.hessian();
     if constexpr (Dim == 2)
       if (cells_.axisymmetric)
         if (const HoopBarrier hoop(cells_, elements_[e]); hoop.is_active(positions)) {
-          is_active = true;
-          hoop.add_hessian(positions, of_barriers);
+          if (!of_barriers) of_barriers = Mat<Dim * kNodes>::Zero();
+          hoop.add_hessian(positions, *of_barriers);
         }
-    if (!is_active) return;
-    of_barriers *= barrier_weight(e);
-    project_block(of_barriers, psd);
-    block += of_barriers;
+    if (!of_barriers) return;
+    *of_barriers *= barrier_weight(e);
+    project_block(*of_barriers, psd);
+    block += *of_barriers;
   }
   void sample_moduli() {
     varying_.clear();

@@ -35,17 +35,18 @@ template <int Dim, int LawDim>
 struct ElasticSite {
   Nodal<Dim> gradients;                                 ///< of shape functions, as columns
   Eigen::Matrix<double, 1, kQuadraticNodes<Dim>> hoop;  ///< shape functions by R; where the cell is turned
-  double fraction, volume, turn;                        ///< of the rest volume; this; 2 pi R or 1
+  const QuadraturePoint<Dim>& point;
+  double volume, turn;  ///< at rest; 2 pi R or 1
 
   ElasticSite(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, const QuadraturePoint<Dim>& point)
-      : gradients(shape_gradients<Dim>(element, point.weights)), fraction(point.fraction), volume(element.volume), turn(1) {
+      : gradients(shape_gradients<Dim>(element, point.weights)), point(point), volume(element.volume), turn(1) {
     if constexpr (LawDim > Dim) {
       const Vec<Dim> X = rest_position<Dim>(cells, element, point.weights);
       turn = cells.turn(X);
       hoop = quadratic_shapes<Dim>(element.curved, point.weights).transpose() / X[0];
     }
   }
-  double weight(double scale) const { return scale * fraction * volume * turn; }
+  double weight(double scale) const { return scale * point.fraction * volume * turn; }
   DisplacementGradient<LawDim> displacement_gradient(const NodalDisplacements<Dim>& u) const {
     if constexpr (LawDim == Dim)
       return {u.relative * gradients.transpose()};

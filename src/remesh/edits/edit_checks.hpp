@@ -7,6 +7,7 @@
 
 #include "geometry/measures.hpp"
 #include "geometry/predicates.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "remesh/edits.hpp"
 
 namespace itr {
@@ -15,11 +16,6 @@ template <std::size_t N>
 std::array<int, N> replaced(std::array<int, N> ids, int from, int to) {
   std::replace(ids.begin(), ids.end(), from, to);
   return ids;
-}
-
-template <std::size_t N>
-bool holds(const std::array<int, N>& ids, int v) {
-  return std::find(ids.begin(), ids.end(), v) != ids.end();
 }
 
 /// Whether both ends have the same tag: where the edge is on the boundary, all of it is held by conditions with that tag.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "edit_checks.hpp"
+#include "geometry/cofactors.hpp"
 #include "old_fields.hpp"
 
 namespace itr {
@@ -19,17 +20,6 @@ Mat<Dim> regular_edges() {
   edges(1, 1) = std::sqrt(3.0) / 2;
   if constexpr (Dim == 3) edges.col(2) << 0.5, std::sqrt(3.0) / 6, std::sqrt(2.0 / 3.0);
   return edges;
-}
-
-Mat<2> cofactor_of(const Mat<2>& J) {
-  Mat<2> cofactor;
-  cofactor << J(1, 1), -J(1, 0), -J(0, 1), J(0, 0);
-  return cofactor;
-}
-Mat<3> cofactor_of(const Mat<3>& J) {
-  Mat<3> cofactor;
-  cofactor << J.col(1).cross(J.col(2)), J.col(2).cross(J.col(0)), J.col(0).cross(J.col(1));
-  return cofactor;
 }
 
 /// Sum of the AMIPS measure tr(J^T J) / det(J)^(2/Dim) over the cells around a vertex, by its position.
@@ -68,7 +58,7 @@ class StarShape {
       const double denominator = Dim == 2 ? det : std::cbrt(det * det);
       sum += numerator / denominator;
       if (!gradient) continue;
-      const Vec<Dim> dn = 2 * J * row_, dd = cofactor_of(J) * row_;  // dJ = dX * row^T
+      const Vec<Dim> dn = 2 * J * row_, dd = cofactors(J) * row_;  // dJ = dX * row^T
       *gradient += dn / denominator - kPower * numerator * dd / (denominator * det);
       *hessian += 2 * row_.squaredNorm() / denominator * Mat<Dim>::Identity() -
                   kPower * (dn * dd.transpose() + dd * dn.transpose()) / (denominator * det) +
