@@ -268,6 +268,13 @@ TEST_F(PolyfemKeys, BodiesHaveForcesOfTheirOwn) {
   EXPECT_EQ(at({3.5, 0.5}, 2, 2), Vec<2>(-2, 0));
   scene["boundary_conditions"]["rhs"].erase(1);
   EXPECT_EQ(read2(scene).body_acceleration({Vec<2>(3, 0), Vec<2>(0, 0), setup.mesh.part(2)}, 1), Vec<2>(0, 0));
+  const auto refused = [&](const json& entry) {
+    json wrong = scene;
+    wrong["boundary_conditions"]["rhs"].push_back(entry);
+    return failure(wrong).place;
+  };
+  EXPECT_EQ(refused({{"id", 2}, {"value", {0, 9}}, {"interpolation", 3}}), "/boundary_conditions/rhs/1/interpolation");
+  EXPECT_EQ(refused(9), "/boundary_conditions/rhs/1");
   // Bodies that share vertices are one part.
   scene["geometry"] = json::array(
       {{{"mesh", "square.obj"}, {"volume_selection", json::array({{{"id", 1}, {"axis", "x"}, {"position", 0.5}}, 2})}}});
@@ -307,6 +314,10 @@ TEST_F(PolyfemKeys, ForcesOnVerticesAndAlongNormalsStretchABar) {
   conditions.erase("normal_aligned_neumann_boundary");
   conditions["nodal_neumann_boundary"] = json::array({{{"id", 3}, {"value", {1, 0}}}});
   EXPECT_EQ(failure(scene).place, "/boundary_conditions/nodal_neumann_boundary/0/id");
+  EXPECT_EQ(failure(scene).expected, "the id of a point_selection: 9");
+  conditions.erase("nodal_neumann_boundary");
+  conditions["pressure_cavity"] = {{"id", 9}, {"value", 1}};
+  EXPECT_EQ(failure(scene).expected, "the id of one: 1, 2, 3, 4");
 }
 
 TEST_F(PolyfemKeys, OrthotropicMaterialsHaveTheModuliOfTheirAxes) {
@@ -420,6 +431,8 @@ TEST_F(PolyfemKeys, PythonGivesValues) {
   EXPECT_EQ(value[0], 0.25 * 0.1 + 0.7);
   EXPECT_EQ(value[1], std::cos(0.3));
   EXPECT_NE(read.identity.find("file_name"), std::string::npos);
+  scene["boundary_conditions"]["rhs"] = {python("left"), 0};
+  EXPECT_EQ(read2(scene).body_acceleration({Vec<2>(0.3, 0.7), Vec<2>(0, 0), 0}, 0.1), Vec<2>(-value[0], 0));
   const std::string place = "/boundary_conditions/dirichlet_boundary/0/value/0";
   condition[0]["value"][0] = python("broken");
   EXPECT_NE(failure(scene).found.find("ZeroDivisionError"), std::string::npos);
