@@ -252,7 +252,8 @@ TEST_F(PolyfemKeys, SelectionsStandInFiles) {
   EXPECT_EQ(refused("3 0 9\n"), place);    // no such vertex
   EXPECT_EQ(refused("3 0 1 2\n"), place);  // too many
   EXPECT_EQ(refused("x 0 1\n"), place);
-  EXPECT_EQ(refused("3 0 1\n4 1 3\n"), place);  // of no facet of a cell
+  EXPECT_EQ(refused("2147483646 0 1\n"), place);  // with id_offset
+  EXPECT_EQ(refused("3 0 1\n4 1 3\n"), place);    // of no facet of a cell
   EXPECT_NE(failure(scene).found.find("\"4 1 3\" in line 2"), std::string::npos) << failure(scene).found;
   write("facets.txt", "3 0 1\n3 0 2\n4 2 3\n");  // between two cells: no error, and no tag
   EXPECT_EQ(read2(scene).dirichlet.size(), 2u);

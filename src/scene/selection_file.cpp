@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -14,6 +15,7 @@ namespace {
 
 constexpr const char* kSelections[] = {"volume_selection", "surface_selection", "point_selection"};
 constexpr const char* kExpected = "a file of ids";
+constexpr int kLargestId = 2147483646;
 
 /// Vertices of the elements of a file with so many corners; none for points, which are their own.
 std::vector<std::vector<int>> corners_of(const MeshFile& file, int corners) {
@@ -81,7 +83,8 @@ void add_file(const Node& name, int offset, int corners, int dim, bool is_facet,
     for (int v = 0; words >> v;) vertices.push_back(v);
     const auto refuse = [&](const std::string& expected) { refuse_line({line, number}, expected); };
     const auto is_vertex = [&](int v) { return v >= 0 && v < static_cast<int>(file.vertices.size()); };
-    if (id < 0 || !words.eof() || !std::all_of(vertices.begin(), vertices.end(), is_vertex))
+    if (id < 0 || std::int64_t{id} + offset > kLargestId || !words.eof() ||
+        !std::all_of(vertices.begin(), vertices.end(), is_vertex))
       refuse("an id >= 0, or one and vertices of the mesh file, which are counted from 0");
     std::sort(vertices.begin(), vertices.end());
     if (vertices.empty()) {
