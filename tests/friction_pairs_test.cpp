@@ -262,6 +262,7 @@ TEST_F(FrictionPairScenes, RefuseWhatNothingHasWithTheNearestName) {
   EXPECT_EQ(parts.found, "\"ruber\", which nothing has");
   EXPECT_NE(parts.expected.find("\"rubber\" perhaps"), std::string::npos) << parts.expected;
   EXPECT_NE(parts.expected.find("\"steel\""), std::string::npos) << parts.expected;
+  EXPECT_NE(parts.expected.find("a surface or an obstacle: 4, 9, \"steel\""), std::string::npos) << parts.expected;
   const auto wrong = [&](json pair) {
     return failure(with_pairs(json::array({pair}))).place.substr(sizeof("/contact/friction_pairs/0") - 1);
   };

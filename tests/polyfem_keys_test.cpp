@@ -252,6 +252,15 @@ TEST_F(PolyfemKeys, SelectionsStandInFiles) {
   EXPECT_EQ(refused("3 0 9\n"), place);    // no such vertex
   EXPECT_EQ(refused("3 0 1 2\n"), place);  // too many
   EXPECT_EQ(refused("x 0 1\n"), place);
+  EXPECT_EQ(refused("2147483646 0 1\n"), place);  // with id_offset
+  EXPECT_EQ(refused("3 0 1\n4 1 3\n"), place);    // of no facet of a cell
+  EXPECT_NE(failure(scene).found.find("\"4 1 3\" in line 2"), std::string::npos) << failure(scene).found;
+  write("facets.txt", "3 0 1\n3 0 2\n4 2 3\n");  // between two cells: no error, and no tag
+  EXPECT_EQ(read2(scene).dirichlet.size(), 2u);
+  write("cells.txt", "5\n");
+  EXPECT_EQ(failure(scene).place, "/geometry/0/volume_selection");
+  scene["geometry"][0]["volume_selection"] = {{"id", "no_such.txt"}, {"id_offset", 1}};
+  EXPECT_NE(failure(scene).found.find("there is no file"), std::string::npos) << failure(scene).found;
 }
 
 TEST_F(PolyfemKeys, BodiesHaveForcesOfTheirOwn) {
@@ -268,6 +277,13 @@ TEST_F(PolyfemKeys, BodiesHaveForcesOfTheirOwn) {
   EXPECT_EQ(at({3.5, 0.5}, 2, 2), Vec<2>(-2, 0));
   scene["boundary_conditions"]["rhs"].erase(1);
   EXPECT_EQ(read2(scene).body_acceleration({Vec<2>(3, 0), Vec<2>(0, 0), setup.mesh.part(2)}, 1), Vec<2>(0, 0));
+  const auto refused = [&](const json& entry) {
+    json wrong = scene;
+    wrong["boundary_conditions"]["rhs"].push_back(entry);
+    return failure(wrong).place;
+  };
+  EXPECT_EQ(refused({{"id", 2}, {"value", {0, 9}}, {"interpolation", 3}}), "/boundary_conditions/rhs/1/interpolation");
+  EXPECT_EQ(refused(9), "/boundary_conditions/rhs/1");
   // Bodies that share vertices are one part.
   scene["geometry"] = json::array(
       {{{"mesh", "square.obj"}, {"volume_selection", json::array({{{"id", 1}, {"axis", "x"}, {"position", 0.5}}, 2})}}});
@@ -307,6 +323,10 @@ TEST_F(PolyfemKeys, ForcesOnVerticesAndAlongNormalsStretchABar) {
   conditions.erase("normal_aligned_neumann_boundary");
   conditions["nodal_neumann_boundary"] = json::array({{{"id", 3}, {"value", {1, 0}}}});
   EXPECT_EQ(failure(scene).place, "/boundary_conditions/nodal_neumann_boundary/0/id");
+  EXPECT_EQ(failure(scene).expected, "the id of a point_selection: 9");
+  conditions.erase("nodal_neumann_boundary");
+  conditions["pressure_cavity"] = {{"id", 9}, {"value", 1}};
+  EXPECT_EQ(failure(scene).expected, "the id of one: 1, 2, 3, 4");
 }
 
 TEST_F(PolyfemKeys, OrthotropicMaterialsHaveTheModuliOfTheirAxes) {
@@ -420,6 +440,8 @@ TEST_F(PolyfemKeys, PythonGivesValues) {
   EXPECT_EQ(value[0], 0.25 * 0.1 + 0.7);
   EXPECT_EQ(value[1], std::cos(0.3));
   EXPECT_NE(read.identity.find("file_name"), std::string::npos);
+  scene["boundary_conditions"]["rhs"] = {python("left"), 0};
+  EXPECT_EQ(read2(scene).body_acceleration({Vec<2>(0.3, 0.7), Vec<2>(0, 0), 0}, 0.1), Vec<2>(-value[0], 0));
   const std::string place = "/boundary_conditions/dirichlet_boundary/0/value/0";
   condition[0]["value"][0] = python("broken");
   EXPECT_NE(failure(scene).found.find("ZeroDivisionError"), std::string::npos);

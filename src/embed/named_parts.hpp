@@ -16,6 +16,7 @@
 #include "itr/mesh.hpp"
 #include "itr/scene.hpp"
 #include "itr/setup.hpp"
+#include "mesh/facet_tags.hpp"
 
 namespace itr {
 
@@ -29,9 +30,8 @@ class NamedParts {
              bool takes_ids)
       : boundaries_(std::move(boundaries)), takes_ids_(takes_ids) {
     boundaries_.insert(named.surfaces.begin(), named.surfaces.end());
-    std::set<int> surfaces, bodies;
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f)
-      if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
+    const std::set<int> surfaces = facet_tags(mesh);
+    std::set<int> bodies;
     for (CellId c = 0; c < mesh.cell_slots(); ++c) bodies.insert(mesh.body(c));
     if (takes_ids) {
       tags_ = surfaces;

@@ -9,6 +9,8 @@
 #include <set>
 
 #include "function.hpp"
+#include "mesh/facet_tags.hpp"
+#include "polyfem/python_value.hpp"
 #include "readers.hpp"
 #include "selection_file.hpp"
 
@@ -25,10 +27,10 @@ class ConditionReader {
         initial_(root["initial_conditions"]),
         geometry_(root["geometry"]),
         setup_(setup),
-        warnings_(warnings) {
-    for (FacetId f = 0; f < setup_.mesh.facet_slots(); ++f) facet_tags_.insert(setup_.mesh.facet_tag(f));
+        warnings_(warnings),
+        facet_tags_(facet_tags(setup.mesh)) {
     for (VertexId v = 0; v < setup_.mesh.node_slots(); ++v) point_tags_.insert(setup_.mesh.vertex_tag(v));
-    for (auto* tags : {&facet_tags_, &point_tags_}) tags->erase(kNoTag);
+    point_tags_.erase(kNoTag);
   }
 
   void read(ObstacleGeometry<Dim> geometry) {
@@ -69,7 +71,8 @@ class ConditionReader {
     const Node rhs = boundary_["rhs"];
     if (!rhs.exists()) return;
     const std::vector<Node> items = rhs.items();
-    if (!items.empty() && items.front().json().is_object()) return read_accelerations_of_bodies(items);
+    if (!items.empty() && items.front().json().is_object() && !is_python_value(items.front().json()))
+      return read_accelerations_of_bodies(items);
     warn_of_components(rhs, Dim, warnings_);
     const ValueFunction<Dim> value = read_function<Dim>(rhs, -1);
     if (value.is_zero) return;
@@ -85,6 +88,9 @@ class ConditionReader {
     std::map<int, Function> of_part;
     std::set<int> seen;
     for (const Node& item : items) {
+      if (!item.json().is_object()) item.fail("an id and its value");
+      for (const auto& [key, ignored] : item.json().items())
+        if (key != "id" && key != "value") item[key].fail("an unknown key", "id and value");
       const Node value = item["value"];
       warn_of_components(value, Dim, warnings_);
       const ValueFunction<Dim> function = read_function<Dim>(value, -1);
@@ -236,8 +242,8 @@ class ConditionReader {
       end_steps_at_kinks(node["value"], node["interpolation"]);
       const std::vector<int>& tags = ids_of(node["id"]);
       if (std::none_of(tags.begin(), tags.end(), [&](int tag) { return point_tags_.contains(tag); }))
-        sets_.surfaces.refuse(node["id"], read_condition_label(node["id"]),
-                              "the id of a point_selection: ", why_unused(node["id"]));
+        node["id"].fail(abbreviate(node["id"].json()) + ", which no vertex has" + why_unused(node["id"]),
+                        "the id of a point_selection: " + sets_.surfaces.list(&point_tags_));
       std::vector<Vec<Dim>> loaded;
       for (VertexId v = 0; v < setup_.mesh.num_vertices(); ++v) {
         if (std::find(tags.begin(), tags.end(), setup_.mesh.vertex_tag(v)) == tags.end()) continue;
@@ -256,7 +262,7 @@ class ConditionReader {
       double t = std::numeric_limits<double>::quiet_NaN();
       TermFactory<Dim> term;
     };
-    return [=, last = std::make_shared<Last>()](const CellSet<Dim>& cells, double t, double scale) {
+    const auto term_at = [=, last = std::make_shared<Last>()](double t) {
       const std::lock_guard lock(last->mutex);
       if (last->t != t) {
         VectorX nodal = VectorX::Zero(Dim * mesh.num_nodes());
@@ -264,8 +270,9 @@ class ConditionReader {
         last->term = point_forces<Dim>(mesh, nodal);
         last->t = t;
       }
-      return last->term(cells, t, scale);
+      return last->term;
     };
+    return [term_at](const CellSet<Dim>& cells, double t, double scale) { return term_at(t)(cells, t, scale); };
   }
 
   void read_pressure() {
@@ -312,7 +319,8 @@ class ConditionReader {
       for (const int tag : ids_of(id))
         if (facet_tags_.contains(tag)) tags.insert(tag);
       if (tags.size() == before)
-        sets_.surfaces.refuse(id, read_condition_label(id), "the id of a surface of a body: ", why_unused(id));
+        id.fail(abbreviate(id.json()) + ", which no surface of a body has" + why_unused(id),
+                "the id of one: " + sets_.surfaces.list(&facet_tags_));
     }
     return {tags.begin(), tags.end()};
   }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <set>
 
+#include "mesh/facet_tags.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -28,9 +29,8 @@ std::array<double, 3> read_place(const Node& node) {
 template <int Dim>
 class ForceReader {
  public:
-  ForceReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh) : parts_(parts), sets_(sets) {
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f) facet_tags_.insert(mesh.facet_tag(f));
-  }
+  ForceReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh)
+      : parts_(parts), sets_(sets), facet_tags_(facet_tags(mesh)) {}
 
   ForceTarget read(const Node& node) const {
     ForceTarget target;
@@ -39,7 +39,7 @@ class ForceReader {
     for (const Node& id : node["bodies"].items()) add_new(body(id), target.bodies);
     std::set<int> vertices;
     for (const Node& id : node["obstacles"].items()) {
-      const std::vector<int>& of_id = obstacle(id);
+      const std::vector<int> of_id = obstacle(id);
       vertices.insert(of_id.begin(), of_id.end());
     }
     target.obstacle_vertices.assign(vertices.begin(), vertices.end());
@@ -69,20 +69,12 @@ class ForceReader {
     return sets_.bodies.of(label);
   }
 
-  /// By the name of a geometry, or by what its `surface_selection` says.
-  const std::vector<int>& obstacle(const Node& node) const {
-    const Label label = read_label(node, 0);
-    if (const auto found = parts_.obstacles.find(label.name); !label.name.empty() && found != parts_.obstacles.end())
-      return found->second;
-    for (const int id : sets_.surfaces.of(label))
-      if (const auto found = parts_.obstacles_by_id.find(id); found != parts_.obstacles_by_id.end()) return found->second;
-    std::set<int> ids;
-    for (const auto& [id, vertices] : parts_.obstacles_by_id) ids.insert(id);
-    std::string known = sets_.surfaces.list(&ids);
-    for (const auto& [name, vertices] : parts_.obstacles)
-      if (sets_.surfaces.of({0, name}).empty()) known += ", \"" + name + "\"";
-    node.fail(abbreviate(node.json()) + ", which nothing has",
-              "the surface_selection of an obstacle, or its name: " + known);
+  std::vector<int> obstacle(const Node& node) const {
+    std::vector<int> vertices = obstacle_vertices(parts_, sets_, read_label(node, 0));
+    if (vertices.empty())
+      node.fail(abbreviate(node.json()) + ", which nothing has",
+                "the surface_selection of an obstacle, or its name: " + list_with_obstacles(parts_, sets_, {}));
+    return vertices;
   }
 
   const PartNames& parts_;
@@ -99,6 +91,24 @@ std::map<std::string, std::vector<int>> ids_by_name(const LabelIds& labels) {
 }
 
 }  // namespace
+
+std::vector<int> obstacle_vertices(const PartNames& parts, const Sets& sets, const Label& label) {
+  if (const auto found = parts.obstacles.find(label.name); !label.name.empty() && found != parts.obstacles.end())
+    return found->second;
+  std::set<int> vertices;
+  for (const int id : sets.surfaces.of(label))
+    if (const auto found = parts.obstacles_by_id.find(id); found != parts.obstacles_by_id.end())
+      vertices.insert(found->second.begin(), found->second.end());
+  return {vertices.begin(), vertices.end()};
+}
+
+std::string list_with_obstacles(const PartNames& parts, const Sets& sets, std::set<int> ids) {
+  std::string names;
+  for (const auto& [id, vertices] : parts.obstacles_by_id) ids.insert(id);
+  for (const auto& [name, vertices] : parts.obstacles)
+    if (sets.surfaces.of({0, name}).empty()) names += ", \"" + name + "\"";
+  return sets.surfaces.list(&ids, std::move(names));
+}
 
 template <int Dim>
 PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& obstacles, const Sets& sets) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <set>
 
+#include "mesh/facet_tags.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -13,9 +13,8 @@ namespace {
 template <int Dim>
 class PairReader {
  public:
-  PairReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh) : parts_(parts), sets_(sets) {
-    for (FacetId f = 0; f < mesh.facet_slots(); ++f) facet_tags_.insert(mesh.facet_tag(f));
-  }
+  PairReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh)
+      : parts_(parts), sets_(sets), facet_tags_(facet_tags(mesh)) {}
 
   FrictionPair read(const Node& node) const {
     FrictionPair pair{side(node["a"]), side(node["b"])};
@@ -39,15 +38,9 @@ class PairReader {
     if (const auto found = parts_.bodies.find(label.name); !label.name.empty() && found != parts_.bodies.end())
       side.bodies = found->second;
     side.surfaces = sets_.surfaces.of(label);
-    std::set<int> vertices;
-    for (const int id : side.surfaces)
-      if (const auto found = parts_.obstacles_by_id.find(id); found != parts_.obstacles_by_id.end())
-        vertices.insert(found->second.begin(), found->second.end());
-    if (const auto found = parts_.obstacles.find(label.name); !label.name.empty() && found != parts_.obstacles.end())
-      vertices.insert(found->second.begin(), found->second.end());
-    side.obstacle_vertices.assign(vertices.begin(), vertices.end());
+    side.obstacle_vertices = obstacle_vertices(parts_, sets_, label);
     std::erase_if(side.surfaces, [&](int tag) { return !facet_tags_.contains(tag); });
-    const bool is_surface = !side.surfaces.empty() || !vertices.empty();
+    const bool is_surface = !side.surfaces.empty() || !side.obstacle_vertices.empty();
     if (!side.bodies.empty() && is_surface)
       node.fail(abbreviate(node.json()) + ", which is a body's and a surface's",
                 "a name or a number that only one of them has");
@@ -60,19 +53,9 @@ class PairReader {
     for (const auto* all : {&parts_.bodies, &parts_.surfaces, &parts_.obstacles})
       for (const auto& [name, ids] : *all) names.insert(name);
     const std::string near = nearest_name(label.name, {names.begin(), names.end()});
-    std::set<int> numbers;
-    for (const auto* labels : {&sets_.bodies, &sets_.surfaces})
-      for (const auto& [known, ids] : labels->all())
-        if (known.name.empty() && !ids.empty()) numbers.insert(known.number);
-    std::erase_if(numbers, [&](int number) {
-      return sets_.bodies.of({number}).empty() && std::ranges::none_of(sets_.surfaces.of({number}), [&](int tag) {
-               return facet_tags_.contains(tag) || parts_.obstacles_by_id.contains(tag);
-             });
-    });
-    std::string known = list_ids({numbers.begin(), numbers.end()});
-    for (const std::string& name : names) known += (known.empty() ? "\"" : ", \"") + name + "\"";
     node.fail(abbreviate(node.json()) + ", which nothing has",
-              (near.empty() ? "" : "\"" + near + "\" perhaps; ") + "a body, a surface or an obstacle: " + known);
+              (near.empty() ? "" : "\"" + near + "\" perhaps; ") + "a body: " + sets_.bodies.list() +
+                  "; or a surface or an obstacle: " + list_with_obstacles(parts_, sets_, facet_tags_));
   }
 
   const PartNames& parts_;

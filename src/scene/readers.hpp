@@ -113,6 +113,11 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
 template <int Dim>
 std::vector<PointTarget> read_points(const Node& root);
 
+/// Vertices of the obstacles of this name or this `surface_selection`, ascending.
+std::vector<int> obstacle_vertices(const PartNames& parts, const Sets& sets, const Label& label);
+/// Labels of surfaces with these ids and of obstacles, for messages.
+std::string list_with_obstacles(const PartNames& parts, const Sets& sets, std::set<int> ids);
+
 // `/contact/friction_pairs`.
 
 /// Throws InputError for what nothing has, and for a number or a name that both a body and a surface have.

@@ -7,6 +7,7 @@
 
 #include "defaults.hpp"
 #include "geometry.hpp"
+#include "mesh/facet_tags.hpp"
 #include "mesh/rest_box.hpp"
 #include "polyfem/python_value.hpp"
 #include "readers.hpp"
@@ -53,8 +54,8 @@ std::set<int> body_ids(const Mesh<Dim>& mesh) {
 template <int Dim>
 Sets sets_of(const Geometry<Dim>& geometry) {
   Sets sets;
-  std::set<int> surfaces(geometry.id.begin(), geometry.id.end());
-  for (FacetId f = 0; f < geometry.mesh.facet_slots(); ++f) surfaces.insert(geometry.mesh.facet_tag(f));
+  std::set<int> surfaces = facet_tags(geometry.mesh);
+  surfaces.insert(geometry.id.begin(), geometry.id.end());
   for (VertexId v = 0; v < geometry.mesh.num_vertices(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
   surfaces.erase(kNoTag);
   /// Parts of a boundary that are in others, too, have its number.
@@ -121,11 +122,11 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   parts = name_parts<Dim>(geometries, obstacles, sets);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);
   read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
-  for (const Cavity& cavity : setup.cavities) {
-    if (std::ranges::any_of(curves, [&](const ForceTarget& curve) { return curve.name == cavity.name; }))
-      root["output"]["forces"].fail("\"" + cavity.name + "\", the name of a cavity", "another name");
-    curves.push_back({.name = cavity.name, .surfaces = cavity.surfaces});
-  }
+  for (const Node& node : root["output"]["forces"].items())
+    for (const Cavity& cavity : setup.cavities)
+      if (node["name"].string("") == cavity.name)
+        node["name"].fail("\"" + cavity.name + "\", the name of a cavity", "another name");
+  for (const Cavity& cavity : setup.cavities) curves.push_back({.name = cavity.name, .surfaces = cavity.surfaces});
   setup.fields.curves = std::move(curves);
   setup.fields.points = read_points<Dim>(root);
   setup.fields.error_bars = root["output"]["error_bars"].boolean(false);

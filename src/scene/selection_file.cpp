@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "selection_file.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -12,6 +15,7 @@ namespace {
 
 constexpr const char* kSelections[] = {"volume_selection", "surface_selection", "point_selection"};
 constexpr const char* kExpected = "a file of ids";
+constexpr int kLargestId = 2147483646;
 
 /// Vertices of the elements of a file with so many corners; none for points, which are their own.
 std::vector<std::vector<int>> corners_of(const MeshFile& file, int corners) {
@@ -35,8 +39,24 @@ int append(const std::vector<int>& corners, MeshFile& file) {
     return static_cast<int>(file.edges.size()) - 1;
   }
   file.triangles.push_back({corners[0], corners[1], corners[2]});
-  if (!file.triangle_body.empty()) file.triangle_body.push_back(0);
+  file.triangle_body.push_back(0);
   return static_cast<int>(file.triangles.size()) - 1;
+}
+
+struct Line {
+  std::string text;
+  int number;
+};
+
+/// Removes the facets of the cells of a file, which have these corners.
+void remove_facets_of_cells(const MeshFile& file, int corners, std::map<std::vector<int>, Line>& facets) {
+  if (facets.empty()) return;
+  for (const auto& cell : corners_of(file, corners + 1))
+    for (int skipped = 0; skipped <= corners; ++skipped) {
+      std::vector<int> facet = cell;
+      facet.erase(facet.begin() + skipped);
+      facets.erase(facet);
+    }
 }
 
 /// `corners`: of a cell, a facet or a point; `dim`: that of the group.
@@ -45,6 +65,10 @@ void add_file(const Node& name, int offset, int corners, int dim, bool is_facet,
   const auto elements = corners_of(file, corners);
   for (std::size_t e = 0; e < elements.size(); ++e) by_corners.emplace(elements[e], static_cast<int>(e));
   std::map<int, std::vector<int>> members;
+  std::map<std::vector<int>, Line> added;
+  const auto refuse_line = [&](const Line& line, const std::string& expected) {
+    name.fail(fmt::format("{}, with \"{}\" in line {}", abbreviate(name.json()), line.text, line.number), expected);
+  };
   std::ifstream stream(MeshFiles::find(name, kExpected));
   int element = 0, number = 0;
   for (std::string line; std::getline(stream, line);) {
@@ -57,11 +81,10 @@ void add_file(const Node& name, int offset, int corners, int dim, bool is_facet,
     }
     std::vector<int> vertices;
     for (int v = 0; words >> v;) vertices.push_back(v);
-    const auto refuse = [&](const std::string& expected) {
-      name.fail(abbreviate(name.json()) + ", with \"" + line + "\" in line " + std::to_string(number), expected);
-    };
+    const auto refuse = [&](const std::string& expected) { refuse_line({line, number}, expected); };
     const auto is_vertex = [&](int v) { return v >= 0 && v < static_cast<int>(file.vertices.size()); };
-    if (id < 0 || !words.eof() || !std::all_of(vertices.begin(), vertices.end(), is_vertex))
+    if (id < 0 || std::int64_t{id} + offset > kLargestId || !words.eof() ||
+        !std::all_of(vertices.begin(), vertices.end(), is_vertex))
       refuse("an id >= 0, or one and vertices of the mesh file, which are counted from 0");
     std::sort(vertices.begin(), vertices.end());
     if (vertices.empty()) {
@@ -73,10 +96,18 @@ void add_file(const Node& name, int offset, int corners, int dim, bool is_facet,
     } else {
       auto [found, is_new] = by_corners.try_emplace(vertices, 0);
       if (is_new && !is_facet) refuse("the vertices of an element of the mesh file");
-      if (is_new) found->second = append(vertices, file);
+      if (is_new) {
+        found->second = append(vertices, file);
+        added.emplace(vertices, Line{line, number});
+      }
       members[id + offset].push_back(found->second);
     }
   }
+  if (element > 0 && element < static_cast<int>(elements.size()))
+    name.fail(fmt::format("{}, with {} lines without vertices", abbreviate(name.json()), element),
+              fmt::format("one for each of the {} elements of the mesh file", elements.size()));
+  remove_facets_of_cells(file, corners, added);
+  if (!added.empty()) refuse_line(added.begin()->second, "the vertices of a facet of the mesh file's cells");
   for (auto& [id, list] : members) {
     if (id <= 0) continue;
     std::sort(list.begin(), list.end());
@@ -97,6 +128,7 @@ Node find_selection_file(const Node& selection) {
   const bool is_rule = selection.json().is_object() && selection.json().size() == 1U + selection.has("id_offset");
   const Node name = is_rule ? selection["id"] : selection;
   if (!name.exists() || !name.json().is_string()) return none;
+  if (is_rule && selection.has("id_offset")) MeshFiles::find(name, kExpected);
   std::error_code ignored;
   return std::filesystem::is_regular_file(name.document().resolve(name.string("")), ignored) ? name : none;
 }

@@ -12,9 +12,10 @@ Label read_label(const Node& node, int fallback) {
     if (name.empty()) node.fail("a number, or a name");
     std::error_code ignored;
     if (std::filesystem::is_regular_file(node.document().resolve(name), ignored))
-      node.fail(abbreviate(node.json()) + ", a file", "a number or a name: files of ids are not supported yet");
+      node.fail(abbreviate(node.json()) + ", a file", "a number or a name: files of ids are for selections of bodies");
     return {0, name};
   }
+  if (!node.json().is_number()) node.fail("a number, or a name");
   const int id = node.integer(fallback);
   if (id < 0 || id > 2147483646) node.fail("an id of 0 to 2147483646");
   return {id};
@@ -103,9 +104,8 @@ const std::vector<int>& LabelIds::of(const Label& label) const {
   return found == of_.end() ? none : found->second;
 }
 
-std::string LabelIds::list(const std::set<int>* ids) const {
+std::string LabelIds::list(const std::set<int>* ids, std::string names) const {
   std::vector<int> numbers;
-  std::string names;
   const auto counts = [&](int id) { return !ids || ids->contains(id); };
   for (const auto& [label, of_label] : of_) {
     if (std::none_of(of_label.begin(), of_label.end(), counts)) continue;

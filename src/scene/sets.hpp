@@ -58,8 +58,8 @@ class LabelIds {
   /// Refuses a label that nothing has: `expected` is followed by those that there are.
   [[noreturn]] void refuse(const Node& node, const Label& label, const std::string& expected,
                            const std::string& why = "") const;
-  /// The labels that there are, or those that stand for one of these ids.
-  std::string list(const std::set<int>* ids = nullptr) const;
+  /// The labels that there are, or those that stand for one of these ids, with other names, as ", \"wall\"".
+  std::string list(const std::set<int>* ids = nullptr, std::string names = "") const;
 
  private:
   std::map<std::set<Label>, int> keys_;

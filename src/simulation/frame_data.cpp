@@ -156,16 +156,19 @@ ForceCurvePoint curve_point(const Setup<Dim>& setup, const State<Dim>& state, co
   return point;
 }
 
-/// Gives a curve the volume and the pressure of the cavity of its name.
+/// Gives curves the volume and the pressure of the cavity of their name.
 template <int Dim>
-void add_cavity(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state, ForceCurvePoint& curve) {
+void add_cavities(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state,
+                  std::vector<ForceCurvePoint>& curves) {
   if (setup.cavities.empty()) return;
-  curve.cavity.assign(2, std::numeric_limits<double>::quiet_NaN());
+  for (ForceCurvePoint& curve : curves) curve.cavity.assign(2, std::numeric_limits<double>::quiet_NaN());
+  const ConstVectorView x = state.history.x[0].head(Dim * cells.num_vertices);
+  const Loads<Dim> loads = loads_at(setup, state.t);
   for (std::size_t i = 0; i < setup.cavities.size(); ++i) {
-    if (setup.cavities[i].name != curve.name) continue;
-    const CavityEnergy<Dim> cavity(cells, loads_at(setup, state.t).cavities[i], 1);
-    const ConstVectorView x = state.history.x[0].head(Dim * cells.num_vertices);
-    curve.cavity = {cavity.volume(x), cavity.pressure(x)};
+    const auto curve = std::ranges::find(curves, setup.cavities[i].name, &ForceCurvePoint::name);
+    if (curve == curves.end()) continue;
+    const CavityEnergy<Dim> cavity(cells, loads.cavities[i], 1);
+    curve->cavity = {cavity.volume(x), cavity.pressure(x)};
   }
 }
 
@@ -260,7 +263,7 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
   for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
-  for (ForceCurvePoint& curve : asked.curves) add_cavity(setup, frame.cells, state, curve);
+  add_cavities(setup, frame.cells, state, asked.curves);
   asked.points = points_of(setup, state, errors);
   if (options.von_mises || options.stress) {
     CellStress stress = stress_of<Dim>(frame, data.x, state.quadrature, setup);

@@ -9,6 +9,7 @@
 
 #include "fem/cell_set.hpp"
 #include "itr/core.hpp"
+#include "mesh/facet_tags.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/moment.hpp"
 
@@ -53,9 +54,8 @@ void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_
                     const std::string& place) {
   if (target.surfaces.empty() && target.bodies.empty() && target.obstacle_vertices.empty())
     throw InputError({"", place, "no surfaces, bodies or obstacles", "at least one of them"});
-  std::set<int> surfaces, bodies;
-  for (const FacetId f : mesh.live_facets())
-    if (mesh.facet_tag(f) != kNoTag) surfaces.insert(mesh.facet_tag(f));
+  const std::set<int> surfaces = facet_tags(mesh);
+  std::set<int> bodies;
   for (const CellId c : mesh.live_cells()) bodies.insert(mesh.body(c));
   refuse_unknown_ids(target.surfaces, surfaces, place, "the id of a surface");
   refuse_unknown_ids(target.bodies, bodies, place, "the id of a body");

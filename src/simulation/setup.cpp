@@ -180,6 +180,10 @@ VertexId find_rim(const Mesh<Dim>& mesh, const std::vector<int>& tags) {
 
 template <int Dim>
 void check_cavities(const Setup<Dim>& setup) {
+  if (setup.cavities.empty()) return;
+  const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
+  VectorX rest(Dim * cells.num_vertices);
+  for (int v = 0; v < cells.num_vertices; ++v) rest.template segment<Dim>(Dim * v) = cells.rest[v];
   for (std::size_t i = 0; i < setup.cavities.size(); ++i) {
     const Cavity& cavity = setup.cavities[i];
     const std::string place = fmt::format("/boundary_conditions/pressure_cavity/{}", i);
@@ -190,9 +194,6 @@ void check_cavities(const Setup<Dim>& setup) {
       refuse(place + "/id",
              fmt::format("a surface that does not close: it ends at ({:.6g}) m", fmt::join(setup.mesh.rest(end), ", ")),
              "surfaces that close around the cavity");
-    const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
-    VectorX rest(Dim * cells.num_vertices);
-    for (int v = 0; v < cells.num_vertices; ++v) rest.template segment<Dim>(Dim * v) = cells.rest[v];
     const double volume = CavityEnergy<Dim>(cells, CavityLoad{cavity.surfaces}, 1).volume(rest);
     if (!(volume > 0))
       refuse(place + "/id", volume < 0 ? "a surface around the body" : "no surface", "surfaces around a cavity in it");

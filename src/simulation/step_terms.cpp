@@ -43,11 +43,11 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
       return finite<Dim, double>(f(X, t), "pressure", X, t);
     });
   for (const Cavity& cavity : setup.cavities) {
+    const std::string place = fmt::format("/boundary_conditions/pressure_cavity/{}/value", loads.cavities.size());
     CavityLoad load{cavity.surfaces, 0, cavity.external_pressure, cavity.exponent, cavity.bulk_modulus};
-    load.pressure =
-        finite<Dim, double>(cavity.pressure ? cavity.pressure(t) : 0, "pressure of a cavity", Vec<Dim>::Zero(), t);
+    load.pressure = finite<Dim, double>(cavity.pressure ? cavity.pressure(t) : 0, place.c_str(), Vec<Dim>::Zero(), t);
     if (cavity.bulk_modulus == 0 && load.pressure + load.external_pressure < 0)
-      throw InputError({"", "pressure of a cavity", fmt::format("{:g} Pa at t = {:g} s, below a vacuum", load.pressure, t),
+      throw InputError({"", place, fmt::format("{:g} Pa at t = {:g} s, below a vacuum", load.pressure, t),
                         fmt::format("at least minus the external pressure, {:g} Pa", load.external_pressure)});
     loads.cavities.push_back(std::move(load));
   }

@@ -180,8 +180,9 @@ void find_hard_meshes(const MeshFigures<Dim>& figures, std::vector<std::string>&
   if (figures.slivers > 0)
     found.push_back(fmt::format("{} slivers (quality below {}), the worst is element {} with {:.2g}", figures.slivers,
                                 kSliver, figures.worst_cell, figures.worst_quality));
-  if (figures.longest > kLargeRatio * figures.shortest)
-    found.push_back(fmt::format("edges differ in length by a factor of {:.2g}", figures.longest / figures.shortest));
+  if (figures.edges.longest > kLargeRatio * figures.edges.shortest)
+    found.push_back(
+        fmt::format("edges differ in length by a factor of {:.2g}", figures.edges.longest / figures.edges.shortest));
 }
 
 /// Newton takes the fewest iterations where the barrier is about as stiff as the bodies (verification/newton).
@@ -409,10 +410,11 @@ void foretell_waves(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
   if (setup.time.adaptive.enabled || !has_waves(setup, figures, speed)) return;
   const Units& units = setup.units;
   const double dt = setup.time.dt;
-  words.push_back(fmt::format(
-      "waves run at up to {}: through the shortest edge ({}) in {}, through the bodies ({}) in {}; dt = {}",
-      units.text(speed, "m/s"), units.text(figures.shortest, "m", 3), units.text(figures.shortest / speed, "s", 2),
-      units.text(figures.size, "m", 3), units.text(figures.size / speed, "s", 2), units.text(dt, "s", 6)));
+  words.push_back(
+      fmt::format("waves run at up to {}: through the shortest edge ({}) in {}, through the bodies ({}) in {}; dt = {}",
+                  units.text(speed, "m/s"), units.text(figures.edges.shortest, "m", 3),
+                  units.text(figures.edges.shortest / speed, "s", 2), units.text(figures.size, "m", 3),
+                  units.text(figures.size / speed, "s", 2), units.text(dt, "s", 6)));
   const double period = 2 * figures.size / speed, phase = 2 * std::numbers::pi * dt / period;
   const bool is_low_order = setup.time.integrator != Integrator::bdf || setup.time.bdf_order <= 2;
   if (!is_low_order) return;

@@ -131,8 +131,8 @@ class Explanation {
                  units.text(material.density * sum.volume, "kg"));
     }
     fmt::print("  {} vertices, {} elements, edges {:.4g} to {}, worst quality {:.3g} (1: regular; element {})\n",
-               mesh.num_vertices(), mesh.num_cells(), units.from_si(figures.shortest, "m"), units.text(figures.longest, "m"),
-               figures.worst_quality, figures.worst_cell);
+               mesh.num_vertices(), mesh.num_cells(), units.from_si(figures.edges.shortest, "m"),
+               units.text(figures.edges.longest, "m"), figures.worst_quality, figures.worst_cell);
     if (const Mesh<Dim>& curved = simulation_.state().mesh; curved.has_nodes())
       fmt::print(
           "  {} of {} edges are curved and carry a node: {} nodes in all; elasticity by {} points a cell with curved "

@@ -2,12 +2,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <algorithm>
-#include <limits>
 #include <map>
 
 #include "itr/mesh.hpp"
 #include "mesh/turn.hpp"
+#include "simulation/sizes.hpp"
 
 namespace itr::cli {
 
@@ -21,19 +20,14 @@ struct MeshFigures {
     double volume = 0;
   };
   std::map<int, Body> bodies;
-  double shortest = std::numeric_limits<double>::infinity(), longest = 0;  ///< edges [m]
+  EdgeLengths edges;
   double worst_quality = 1;
   CellId worst_cell = 0;
   int slivers = 0;
   double size = 0;                     ///< longest side of the bodies' box [m]
   Vec<Dim> center = Vec<Dim>::Zero();  ///< the vertex nearest to the box's, where loads are defined in any case
 
-  explicit MeshFigures(const Mesh<Dim>& mesh) {
-    for (const auto& [a, b] : mesh.edges()) {
-      const double length = (mesh.rest(a) - mesh.rest(b)).norm();
-      shortest = std::min(shortest, length);
-      longest = std::max(longest, length);
-    }
+  explicit MeshFigures(const Mesh<Dim>& mesh) : edges(edge_lengths(mesh)) {
     Eigen::AlignedBox<double, Dim> box;
     for (const CellId c : mesh.live_cells()) {
       Body& body = bodies[mesh.body(c)];

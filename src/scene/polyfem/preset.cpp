@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PolyFEM's preset problem ElasticExact: the body forces and the displacements of the boundary that a given polynomial field
 // of displacements needs, so that a solution shows the error of its mesh.
+#include <array>
 #include <cmath>
 #include <span>
 
 #include "../readers.hpp"
+#include "mesh/facet_tags.hpp"
 
 namespace itr::scene {
 
@@ -74,13 +76,10 @@ void read_preset_problem(const Node& root, const LabelIds& bodies, Setup<Dim>& s
     // PolyFEM multiplies the force by the density, as it does an rhs.
     return holding_force<Dim>(material, X, field.gradient, field.second);
   };
-  std::set<int> tags;
-  for (FacetId f = 0; f < setup.mesh.facet_slots(); ++f) tags.insert(setup.mesh.facet_tag(f));
   std::array<bool, Dim> all;
   all.fill(true);
-  for (const int tag : tags)
-    if (tag > 0 && tag != kNoTag)
-      setup.dirichlet.push_back({tag, all, [](const RestPoint<Dim>& X, double t) { return Field<Dim>(X, t).u; }});
+  for (const int tag : facet_tags(setup.mesh))
+    if (tag > 0) setup.dirichlet.push_back({tag, all, [](const RestPoint<Dim>& X, double t) { return Field<Dim>(X, t).u; }});
 }
 
 template void read_preset_problem<2>(const Node&, const LabelIds&, Setup<2>&);
