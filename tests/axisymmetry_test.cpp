@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "advance.hpp"
+#include "block.hpp"
 #include "energy/inertia.hpp"
 #include "itr/simulation.hpp"
 #include "scene_folder.hpp"
@@ -17,12 +19,6 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 using Scene = Setup<2>;
-
-double axial_sum(const VectorX& forces) {
-  double sum = 0;
-  for (Eigen::Index i = 1; i < forces.size(); i += 2) sum += forces[i];
-  return sum;
-}
 
 template <typename Place>
 Mesh<2> mapped(int n, const Place& place) {
@@ -45,7 +41,7 @@ Scene static_setup(Mesh<2> mesh, int order) {
 double largest_error(const Scene& setup, const std::function<Vec<2>(const Vec<2>&)>& exact) {
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
-  EXPECT_TRUE(simulation.advance().ok);
+  advance(simulation);
   const auto& state = simulation.state();
   double largest = 0, size = 0;
   for (int v = 0; v < state.mesh.num_nodes(); ++v) {
@@ -124,7 +120,7 @@ TEST(Axisymmetry, RodSwingsAlongItsAxis) {
     setup.initial_velocity.push_back({1, [=](const Vec<2>& X, double) { return Vec<2>(0, V * std::cos(kPi * X[1])); }});
     linear::Registry registry;
     Simulation<2> simulation(setup, registry);
-    while (!simulation.finished()) ASSERT_TRUE(simulation.advance().ok);
+    while (!simulation.finished()) advance(simulation);
     const auto& state = simulation.state();
     for (int v = 0; v < state.mesh.num_nodes(); ++v) {
       const Vec<2> X = state.mesh.point_of_node(v);
@@ -142,7 +138,7 @@ double axial_momentum(const Simulation<2>& simulation) {
   VectorX product = VectorX::Zero(state.history.v[0].size());
   InertiaEnergy<2>(whole_mesh(state.mesh, setup.obstacles.rest), setup.materials, MassKind::consistent, product)
       .add_mass_product(state.history.v[0], product);
-  return axial_sum(product);
+  return sum<2>(product)[1];
 }
 
 /// A disc falls on the ground and rebounds, with friction, remeshed: what the step keeps it keeps then, too.
@@ -166,8 +162,7 @@ TEST(Axisymmetry, ADiscThatFallsIsRemeshedAndKeepsItsMass) {
   int edits = 0;
   double last = start;
   while (!simulation.finished()) {
-    const auto result = simulation.advance();
-    ASSERT_TRUE(result.ok) << result.reason;
+    const StepResult result = advance(simulation);
     edits += result.report.splits.accepted + result.report.curves.accepted + result.report.collapses.accepted;
     const auto& state = simulation.state();
     for (int v = 0; v < state.mesh.num_nodes(); ++v) {
@@ -175,7 +170,9 @@ TEST(Axisymmetry, ADiscThatFallsIsRemeshedAndKeepsItsMass) {
       EXPECT_TRUE(state.mesh.is_on_axis(v) ? r == 0 : r > 0) << v;
     }
     last = axial_momentum(simulation);
-    if (result.report.energy.contact == 0 && state.step < 2) EXPECT_NEAR(last, start, 1e-9 * std::abs(start));
+    if (state.step == 1) {  // still in flight
+      EXPECT_NEAR(last, start, 1e-9 * std::abs(start));
+    }
   }
   EXPECT_GT(edits, 5);
   EXPECT_GT(last, -0.3 * start);  // upwards
@@ -199,14 +196,13 @@ TEST(Axisymmetry, RemeshingInFlightKeepsTheMomentumAlongTheAxis) {
     const double start = axial_momentum(simulation);
     int edits = 0;
     while (!simulation.finished()) {
-      const auto result = simulation.advance();
-      ASSERT_TRUE(result.ok) << result.reason;
+      const StepResult result = advance(simulation);
       const StepReport& r = result.report;
       edits += r.splits.accepted + r.collapses.accepted + r.swaps.accepted + r.smooths.accepted;
       EXPECT_NEAR(axial_momentum(simulation), start, 1e-9 * std::abs(start)) << "step " << simulation.state().step;
       const auto& state = simulation.state();
       for (int v = 0; v < state.mesh.num_nodes(); ++v)
-        if (state.mesh.is_on_axis(v)) EXPECT_EQ(state.history.v[0][2 * v], 0) << v;
+        EXPECT_EQ(state.mesh.is_on_axis(v) ? state.history.v[0][2 * v] : 0, 0) << v;
     }
     EXPECT_GT(edits, 5);
   }

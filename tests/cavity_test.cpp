@@ -10,6 +10,8 @@
 #include <numbers>
 #include <random>
 
+#include "advance.hpp"
+#include "block.hpp"
 #include "derivatives.hpp"
 #include "newton/rank_one_system.hpp"
 #include "output/force_file.hpp"
@@ -67,12 +69,16 @@ Mesh<3> hollow_box<3>() {
 const CavityLoad kLoads[] = {{{kInner}, 2, 5, 1.4, 0}, {{kInner}, -1, 4, 1, 0}, {{kInner}, 3, 1, 1.4, 20}};
 
 template <int Dim>
+VectorX rest_of(const CellSet<Dim>& cells) {
+  VectorX x(Dim * cells.num_vertices);
+  for (int v = 0; v < cells.num_vertices; ++v) vertex_of<Dim>(x, v) = cells.rest[v];
+  return x;
+}
+
+template <int Dim>
 VectorX perturbed_rest(const CellSet<Dim>& cells, std::mt19937& random) {
   std::normal_distribution<double> normal(0, 0.08);
-  VectorX x(Dim * cells.num_vertices);
-  for (int v = 0; v < cells.num_vertices; ++v)
-    for (int c = 0; c < Dim; ++c) x[Dim * v + c] = cells.rest[v][c] + normal(random);
-  return x;
+  return rest_of(cells) + VectorX::NullaryExpr(Dim * cells.num_vertices, [&] { return normal(random); });
 }
 
 /// The whole Hessian, with the part that is not assembled.
@@ -90,8 +96,7 @@ void expect_cavity_derivatives(const CellSet<Dim>& cells, double rest_volume) {
   Workspace workspace;
   for (const CavityLoad& load : kLoads) {
     const CavityEnergy<Dim> cavity(cells, load, 0.3);
-    VectorX rest(Dim * cells.num_vertices);
-    for (int v = 0; v < cells.num_vertices; ++v) vertex_of<Dim>(rest, v) = cells.rest[v];
+    const VectorX rest = rest_of(cells);
     EXPECT_NEAR(cavity.volume(rest), rest_volume, 1e-13 * rest_volume);
     EXPECT_NEAR(cavity.value(rest, workspace), 0, 1e-13);
     EXPECT_NEAR(cavity.pressure(rest), load.pressure, 1e-13);
@@ -107,8 +112,7 @@ void expect_cavity_derivatives(const CellSet<Dim>& cells, double rest_volume) {
       EXPECT_LE((column - hessian.col(i)).norm(), 1e-7);
     }
     expect_psd(cavity, x);
-    Vec<Dim> resultant = Vec<Dim>::Zero();
-    for (int v = 0; v < cells.num_vertices; ++v) resultant += vertex_of<Dim>(gradient, v);
+    Vec<Dim> resultant = sum<Dim>(gradient);
     if (cells.axisymmetric) resultant[0] = 0;  // sums around circles, no resultant
     EXPECT_LE(resultant.norm(), 1e-13);
   }
@@ -129,8 +133,8 @@ TEST(Cavity, DerivativesMatchDifferences) {
 TEST(Cavity, EndsWhereNoVolumeIsLeft) {
   const CellSet<2> cells = whole_mesh(hollow_box<2>(), {});
   Workspace workspace;
-  VectorX x(2 * cells.num_vertices);
-  for (int v = 0; v < cells.num_vertices; ++v) vertex_of<2>(x, v) = Vec<2>(-cells.rest[v][0], cells.rest[v][1]);
+  VectorX x = rest_of(cells);
+  for (Eigen::Index i = 0; i < x.size(); i += 2) x[i] = -x[i];
   EXPECT_EQ(CavityEnergy<2>(cells, kLoads[0], 1).value(x, workspace), std::numeric_limits<double>::infinity());
 }
 
@@ -204,8 +208,7 @@ TEST(Cavity, NewtonSystemSolvesAsIfItWereAssembled) {
     for (Eigen::Index i = 0; i < x.size(); ++i)
       if (!held[i]) all_dofs[i] = solution[dofs.unknown[i]];
     const VectorX back = now * all_dofs;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (!held[i]) EXPECT_NEAR(back[i], rhs[dofs.unknown[i]], 1e-6) << change;
+    for (Eigen::Index i = 0; i < x.size(); ++i) EXPECT_NEAR(held[i] ? 0 : back[i] - rhs[dofs.unknown[i]], 0, 1e-6) << change;
   }
 }
 
@@ -264,8 +267,7 @@ TEST(Cavity, GasInARingExpandsAsLameSays) {
     Simulation<2> simulation(ring(pressure, external, exponent), registry);
     const double V0 = curve_of(simulation).cavity[0];
     EXPECT_NEAR(curve_of(simulation).cavity[1], pressure, 1e-9 * pressure);
-    const StepResult result = simulation.advance();
-    ASSERT_TRUE(result.ok) << result.reason;
+    const StepResult result = advance(simulation);
     const double compliance = (1 + kNu) / kE * (kA * kA * (1 - 2 * kNu) + kB * kB) / (kB * kB - kA * kA);
     double p = pressure, ratio = 1;
     for (int i = 0; i < 50; ++i) {  // p by the volume, the volume by p
@@ -328,8 +330,7 @@ TEST(Cavity, IsPartOfDynamicsWithRemeshing) {
   const double V0 = curve_of(simulation).cavity[0];
   int edits = 0;
   for (int step = 0; step < setup.time.steps; ++step) {
-    const StepResult result = simulation.advance();
-    ASSERT_TRUE(result.ok) << result.reason;
+    const StepResult result = advance(simulation);
     edits += result.report.splits.accepted;
     const auto [V, p] = std::pair(curve_of(simulation).cavity[0], curve_of(simulation).cavity[1]);
     const double p0 = 2e6 * simulation.state().t;
@@ -398,9 +399,7 @@ TEST(Cavity, ClosesOnTheAxis) {
   setup.mesh.set_axisymmetric(true);
   EXPECT_EQ(refusal(setup), "");
   const CellSet<2> whole = whole_mesh(setup.mesh, {});
-  VectorX rest(2 * whole.num_vertices);
-  for (int v = 0; v < whole.num_vertices; ++v) vertex_of<2>(rest, v) = whole.rest[v];
-  EXPECT_NEAR(CavityEnergy<2>(whole, CavityLoad{{kInner}}, 1).volume(rest), std::numbers::pi, 1e-13);
+  EXPECT_NEAR(CavityEnergy<2>(whole, CavityLoad{{kInner}}, 1).volume(rest_of(whole)), std::numbers::pi, 1e-13);
 }
 
 TEST(Cavity, IsInForceFiles) {

@@ -2,6 +2,8 @@
 // Derivatives of material laws as matrices, whose rows and columns are F by columns.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/LU>
 #include <random>
 
@@ -35,6 +37,22 @@ Flat<Dim> differences_of_stress(const Mat<Dim>& F, const ElasticModuli& moduli) 
     differences.col(k) = Eigen::Map<const Vec<Dim * Dim>>(column.data());
   }
   return differences;
+}
+
+/// Checks stress and tangent at F against central differences of density and stress.
+template <int Dim>
+void expect_law_derivatives(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  constexpr double kStep = 1e-6;
+  const Mat<Dim> P = elastic_stress<Dim>(F, moduli);
+  for (int k = 0; k < Dim * Dim; ++k) {
+    Mat<Dim> plus = F, minus = F;
+    plus(k) += kStep;
+    minus(k) -= kStep;
+    EXPECT_NEAR((elastic_density<Dim>(plus, moduli) - elastic_density<Dim>(minus, moduli)) / (2 * kStep), P(k),
+                1e-7 * (1 + P.norm()));
+  }
+  const Flat<Dim> H = matrix_of<Dim>(elastic_eigensystem<Dim>(F, moduli));
+  EXPECT_LE((H - differences_of_stress<Dim>(F, moduli)).norm(), 1e-6 * H.norm());
 }
 
 /// F near I, of a determinant of at least `least`.
