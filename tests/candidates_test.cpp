@@ -115,10 +115,13 @@ TEST_P(FarMotions, HoldFewPairsAndAreFreeAsFarAsTold) {
   for (int i = 1; i <= 20; ++i)
     EXPECT_FALSE(has_intersection<3>(scene_.surface, scene_.x + i / 20.0 * step * dx)) << "at " << 5 * i << " %";
 
-  BlockingPairs blocking;
-  EXPECT_TRUE(contact_.find_blocking(scene_.x, dx, std::min(1.0, 4 * step), blocking, workspace));
+  BlockingPairs none, first{.takes_first = true};
+  EXPECT_FALSE(contact_.find_blocking(scene_.x, dx, std::min(1.0, 4 * step), none, workspace)) << "too many";
+  EXPECT_TRUE(none.pairs.empty());
+  EXPECT_TRUE(contact_.find_blocking(scene_.x, dx, std::min(1.0, 4 * step), first, workspace));
   EXPECT_LE(pairs_in(workspace), most_);
-  EXPECT_FALSE(blocking.pairs.empty());
+  EXPECT_FALSE(first.pairs.empty());
+  EXPECT_LE(first.pairs.size(), BlockingPairs::kMost);
 
   VectorX steps(dx.size());
   EXPECT_TRUE(contact_.get_vertex_steps(scene_.x, dx, steps, workspace));

@@ -120,26 +120,23 @@ int expect_free_vertex_steps(const Scene& scene, unsigned seed) {
 
 /// Turns a motion by the bounds of what stops it, each met in turn by the shortest change; returns the shares of it that
 /// were free before and are after.
-template <int Dim, typename Scene>
-std::array<double, 2> project_by_bounds(const Scene& scene, unsigned seed) {
-  const ContactEnergy<Dim> contact(scene.surface, scene.options, 3, 0.5);
+std::array<double, 2> project_by_bounds(const Energy& contact, const VectorX& x, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 0.1);
-  VectorX dx = VectorX::NullaryExpr(scene.x.size(), [&] { return normal(random); });
+  VectorX dx = VectorX::NullaryExpr(x.size(), [&] { return normal(random); });
   Workspace workspace;
-  const double before = contact.max_step(scene.x, dx, workspace);
+  const double before = contact.max_step(x, dx, workspace);
   BlockingPairs blocking;
   for (int round = 0; round < 200; ++round) {
-    EXPECT_TRUE(contact.find_blocking(scene.x, dx, 1, blocking, workspace));
+    EXPECT_TRUE(contact.find_blocking(x, dx, 1, blocking, workspace));
     EXPECT_EQ(blocking.bounds.size(), blocking.pairs.size());
-    for (const auto& bound : blocking.bounds) {
-      double squared = 0, change = 0;
-      for (int k = 0; k < bound.size; ++k) squared += bound.coefficients[k] * bound.coefficients[k];
-      change = std::max(0.0, bound.missing) / squared;
-      for (int k = 0; k < bound.size; ++k) dx[bound.dofs[k]] += 0.5 * change * bound.coefficients[k];
+    for (const auto& [dofs, coefficients, missing] : blocking.bounds) {
+      const auto size = static_cast<Eigen::Index>(dofs.size());
+      const VectorX row = Eigen::Map<const VectorX>(coefficients.data(), size);
+      dx(Eigen::Map<const Eigen::VectorXi>(dofs.data(), size)) += 0.5 * std::max(0.0, missing) / row.squaredNorm() * row;
     }
   }
-  return {before, contact.max_step(scene.x, dx, workspace)};
+  return {before, contact.max_step(x, dx, workspace)};
 }
 
 TEST_P(Contact, BoundsOnBlockingPairsFreeTheWay) {
@@ -149,8 +146,10 @@ TEST_P(Contact, BoundsOnBlockingPairsFreeTheWay) {
     freed += fractions[0] < 1 && fractions[1] == 1;
   };
   for (unsigned seed = 0; seed < 20; ++seed) {
-    count(project_by_bounds<2>(ContactScene(seed, GetParam()), seed));
-    count(project_by_bounds<3>(ContactScene3(seed, GetParam(), 0.05 * seed, 0.02), seed));
+    const ContactScene flat(seed, GetParam());
+    const ContactScene3 scene(seed, GetParam(), 0.05 * seed, 0.02);
+    count(project_by_bounds(ContactEnergy<2>(flat.surface, flat.options, 3, 0.5), flat.x, seed));
+    count(project_by_bounds(ContactEnergy<3>(scene.surface, scene.options, 3, 0.5), scene.x, seed));
   }
   EXPECT_GT(blocked, 15);
   EXPECT_GT(freed, 0.8 * blocked);
@@ -341,6 +340,19 @@ void expect_mapped_terms(Scene scene, unsigned seed) {
 TEST(MappedTerms, DerivativesMatchDifferencesAndMomentumIsKept) {
   for (unsigned seed = 0; seed < 6; ++seed) expect_mapped_terms<2>(ContactScene(seed, seed % 2), seed);
   for (unsigned seed = 0; seed < 3; ++seed) expect_mapped_terms<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
+}
+
+TEST(MappedTerms, BoundsOnBlockingPairsFreeTheWay) {
+  int blocked = 0, freed = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    const MappedScene<2, ContactScene> mapped(ContactScene(seed, true), seed);
+    const auto contact = std::make_shared<ContactEnergy<2>>(mapped.scene.surface, mapped.scene.options, 3, 0.5);
+    const auto [before, after] = project_by_bounds(MappedEnergy<2>(contact, mapped.map), mapped.x, seed);
+    blocked += before < 1;
+    freed += before < 1 && after == 1;
+  }
+  EXPECT_GT(blocked, 10);
+  EXPECT_GT(freed, 0.8 * blocked);
 }
 
 TEST(MappedTerms, StepIsFreeOfContactOfWhatIsMapped) {

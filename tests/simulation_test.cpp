@@ -356,5 +356,27 @@ TEST(Simulation, DampingAndPressureActInLocalProblemsToo) {
   EXPECT_GT(done.splits + done.coarsenings, 10);
 }
 
+/// Held dofs advance past all pairs that a body meets one after the other on a round obstacle: bounds on their gaps turn the
+/// step. Iterations that each end at the next pair were 36.
+TEST(Simulation, IsPressedOntoARoundObstacleInFewIterations) {
+  auto setup = free_square(32);
+  constexpr int kSegments = 64;
+  for (int i = 0; i <= kSegments; ++i) {
+    const double x = 0.2 * i / kSegments;
+    setup.obstacles.rest.emplace_back(x, -0.001 - 2 * (x - 0.1) * (x - 0.1));
+    setup.obstacles.motion.push_back(kNone);
+    if (i > 0) setup.obstacles.edges.push_back({i - 1, i});
+  }
+  setup.contact = {.enabled = true, .dhat = 1e-4, .convergent = true};
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-9;
+  setup.dirichlet.push_back({4, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, -0.02); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const StepReport report = advance(simulation).report;
+  EXPECT_GT(report.energy.contact, 0);
+  EXPECT_LE(report.newton_iterations, 20);
+}
+
 }  // namespace
 }  // namespace itr

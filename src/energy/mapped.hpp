@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "energy/blocking.hpp"
 #include "energy/energy.hpp"
 #include "fem/vertex_map.hpp"
 
@@ -51,6 +52,22 @@ class MappedEnergy final : public Energy {
   }
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override {
     return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
+  }
+  bool find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
+                     Workspace& workspace) const override {
+    if (!energy_->find_blocking(map_->positions(x), map_->motion(dx), fraction, blocking, workspace)) return false;
+    for (BlockingPairs::Bound& bound : blocking.bounds) {
+      BlockingPairs::Bound mapped{.missing = bound.missing};
+      for (std::size_t i = 0; i < bound.dofs.size(); ++i) {
+        const int vertex = bound.dofs[i] / Dim, component = bound.dofs[i] % Dim;
+        for (std::size_t k = 0; k < map_->sources(vertex).size(); ++k) {
+          mapped.dofs.push_back(Dim * map_->sources(vertex)[k] + component);
+          mapped.coefficients.push_back(map_->weights(vertex)[k] * bound.coefficients[i]);
+        }
+      }
+      bound = std::move(mapped);
+    }
+    return true;
   }
 
  private:

@@ -21,11 +21,11 @@ struct StepOrigin {
   Workspace& workspace;
 };
 
-constexpr int kMostRounds = 6;            ///< gaps are linearised so often
-constexpr Eigen::Index kMostPairs = 128;  ///< a back-solve each
-constexpr double kAhead = 4;              ///< pairs that stop the step within so many times its free fraction are bounded
-constexpr double kFreeEnough = 0.5;       ///< fraction of the step with which it is done
-constexpr double kLongest = 10;           ///< of the step's largest motion: a turned one is not longer
+constexpr int kMostRounds = 6;       ///< gaps are linearised so often
+constexpr double kAhead = 4;         ///< pairs that stop the step within so many times its free fraction are bounded
+constexpr double kFreeEnough = 0.5;  ///< fraction of the step with which it is done
+constexpr double kLongest = 10;      ///< of the step's largest motion: a turned one is not longer
+constexpr double kMuchMore = 2;      ///< what a step of another direction must bring
 
 /// Solves for the multipliers l >= 0 of the bounds S l >= asked by Gauss-Seidel. A multiplier is 0 if its bound holds
 /// without it.
@@ -59,15 +59,15 @@ class BoundedGaps {
   BoundedGaps(const DofMap& dofs, NewtonSystem& system) : dofs_(dofs), system_(system) {}
 
   /// Takes over the bounds, linearised at the present step. A pair keeps the direction of force of its first round, so that
-  /// its correction is solved for only once. Returns false if there are no bounds, too many, or a solve fails.
+  /// its correction is solved for only once. Returns false if there are no bounds, or a solve fails.
   bool update(const std::vector<BlockingPairs::Bound>& bounds, const VectorX& correction) {
     const auto count = static_cast<Eigen::Index>(bounds.size()), known = forces_.cols();
-    if (count == 0 || count > kMostPairs) return false;
+    if (count == 0) return false;
     rows_.setZero(dofs_.num_unknowns, count);
     asked_.resize(count);
     for (Eigen::Index i = 0; i < count; ++i) {
       const BlockingPairs::Bound& bound = bounds[i];
-      for (int k = 0; k < bound.size; ++k)
+      for (std::size_t k = 0; k < bound.dofs.size(); ++k)
         if (const int unknown = dofs_.unknown[bound.dofs[k]]; unknown != kNone) rows_(unknown, i) += bound.coefficients[k];
       asked_[i] = bound.missing + rows_.col(i).dot(correction);
     }
@@ -102,15 +102,14 @@ class BoundedGaps {
 /// Turns a Newton step of which only `fraction` is free, so that the pairs that stop it keep a gap at its end. The projected
 /// step is the minimum of the quadratic model under bounds on linearised gaps (an active set, as in sequential quadratic
 /// programming). Returns the free fraction of `step`; both stay unchanged if the model gains no more along the projected
-/// step.
-double project_step(const StepOrigin& origin, VectorView step, double fraction) {
+/// step, or, where held dofs advance, if these come hardly farther.
+double project_step(const StepOrigin& origin, Step& step, double fraction, bool is_advancing) {
   const auto& [energy, x, dofs, gradient, system, workspace] = origin;
-  const VectorX first = step;
-  // The curvature along a Newton step is minus its slope, because H step = -gradient.
-  const double slope = gradient.dot(first);
-  double least = ModelAlong{slope, -slope}.change(fraction), free = fraction, best_fraction = fraction;
+  const VectorX first = step.direction;
+  const ModelAlong along_first{gradient.dot(first), step.curvature};
+  double least = along_first.change(fraction), free = fraction, best_fraction = fraction;
   VectorX ahead = first, correction = VectorX::Zero(dofs.num_unknowns);
-  BlockingPairs blocking;
+  BlockingPairs blocking{.takes_first = is_advancing};
   BoundedGaps gaps(dofs, system);
   for (int round = 0; round < kMostRounds; ++round) {
     if (!energy.find_blocking(x, ahead, std::min(1.0, kAhead * free), blocking, workspace)) break;
@@ -125,12 +124,16 @@ double project_step(const StepOrigin& origin, VectorView step, double fraction) 
     }
     // Nearly dependent bounds ask for forces without limit, and for far motions all pairs are candidates of contact.
     if (!(ahead.lpNorm<Eigen::Infinity>() <= kLongest * first.lpNorm<Eigen::Infinity>())) break;
-    free = energy.max_step(x, ahead, workspace);
-    const ModelAlong model{slope + slope_of_correction, -slope - 2 * slope_of_correction + curvature_of_correction};
-    if (model.slope < 0 && model.change(free) < least) {
+    const double asked = is_advancing ? std::min(1.0, kAhead * free) : 1;
+    free = asked * energy.max_step(x, asked * ahead, workspace);
+    // The gradient at free dofs is minus H times the Newton step.
+    const ModelAlong model{along_first.slope + slope_of_correction,
+                           along_first.curvature - 2 * slope_of_correction + curvature_of_correction};
+    if (is_advancing ? free > kMuchMore * best_fraction : model.slope < 0 && model.change(free) < least) {
       least = model.change(free);
       best_fraction = free;
-      step = ahead;
+      step.direction = ahead;
+      step.curvature = model.curvature;
     }
     if (free >= kFreeEnough) break;
   }
@@ -142,10 +145,10 @@ constexpr double kResolved = 8;  ///< times its round-off: changes of energy bel
 constexpr double kLeastFraction = 1e-14;
 constexpr double kStraightFall = 0.8;  ///< of the slope: an energy that falls by more over a full step hardly curves
 constexpr int kMostHalvings = 40, kMostDoublings = 12;
-constexpr double kVertexStepsBelow = 0.25, kMuchMore = 2;  ///< see try_vertex_steps
-constexpr double kBlockedBelow = 0.5;  ///< fraction of a step below which what is in the way is looked at
-constexpr int kLong = 20;              ///< iterations from which on what blocks steps is kept
-constexpr double kWaitBelow = 0.1;     ///< a step blocked to less than this lets the bodies relax before held dofs go on
+constexpr double kVertexStepsBelow = 0.25;  ///< see try_vertex_steps
+constexpr double kBlockedBelow = 0.5;       ///< fraction of a step below which what is in the way is looked at
+constexpr int kLong = 20;                   ///< iterations from which on what blocks steps is kept
+constexpr double kWaitBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
 
 }  // namespace
 
@@ -188,9 +191,9 @@ Search::Ahead Search::look_ahead(Step& step) {
   bool has_vertex_steps = false;
   {
     const ScopedTimer timer(task_.summary.ccd_seconds);
-    if (fraction < kBlockedBelow && !advancing && may_project)
-      fraction = project_step({task_.energy, at_.x(), task_.dofs, at_.gradient(), task_.system, task_.workspace},
-                              step.direction, fraction);
+    if (fraction < (advancing ? kWaitBelow : kBlockedBelow) && may_project)
+      fraction = project_step({task_.energy, at_.x(), task_.dofs, at_.gradient(), task_.system, task_.workspace}, step,
+                              fraction, advancing);
     if (fraction < kVertexStepsBelow && !advancing && is_own_step)
       has_vertex_steps =
           task_.energy.get_vertex_steps(at_.x(), step.direction, scratch_.steps.resize(at_.x().size()), task_.workspace);

@@ -194,18 +194,47 @@ BlockingPairs::Bound bound_gap(PairKind kind, const std::array<int, 4>& vertices
     }
   }
   BlockingPairs::Bound bound;
-  bound.size = Dim * size;
   double gap = 0;
   for (int k = 0; k < size; ++k) {
     gap += weights[k] * normal.dot(end[k]);
     for (int c = 0; c < Dim; ++c) {
-      bound.dofs[Dim * k + c] = Dim * vertices[k] + c;
-      bound.coefficients[Dim * k + c] = weights[k] * normal[c];
+      bound.dofs.push_back(Dim * vertices[k] + c);
+      bound.coefficients.push_back(weights[k] * normal[c]);
     }
   }
   const double start = std::sqrt(pair_distance_squared<Dim>(kind, p.data()));
   bound.missing = std::max(kKeptOfWide * start, kKept * std::min(start, dhat)) - gap;
   return bound;
+}
+
+/// A pair that stops a motion: kind and primitives as in BlockingPairs.
+struct StoppedPair {
+  double free;  ///< fraction of the motion
+  std::array<int, 3> pair;
+};
+
+/// The pairs that stop a motion first, each where it moves: of pairs with a moving vertex in common, or with neighbours,
+/// only the first. Bounds on the others are nearly the same.
+template <int Dim>
+std::vector<StoppedPair> first_of_neighbours(const CollisionSurface& surface, std::vector<StoppedPair> stopped) {
+  std::ranges::stable_sort(stopped, {}, &StoppedPair::free);
+  std::vector<char> is_taken(surface.counts.size());
+  std::vector<int> moving;
+  std::erase_if(stopped, [&](const StoppedPair& one) {
+    const auto kind = static_cast<PairKind>(one.pair[0]);
+    const auto vertices = vertices_of(surface, kind, {one.pair[1], one.pair[2]});
+    moving.clear();
+    for (int k = 0; k < pair_size(kind); ++k)
+      if (surface.counts[vertices[k]]) moving.push_back(vertices[k]);
+    if (std::ranges::any_of(moving, [&](int v) { return is_taken[v] != 0; })) return true;
+    for (const int v : moving) {
+      is_taken[v] = 1;
+      if constexpr (Dim == 3)
+        for (const int e : surface.vertex_edges[v]) is_taken[surface.edges[e][0]] = is_taken[surface.edges[e][1]] = 1;
+    }
+    return false;
+  });
+  return stopped;
 }
 
 /// By vertex, the fraction of its way that is free.
@@ -498,7 +527,8 @@ template <int Dim>
 bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, double fraction, BlockingPairs& blocking,
                                        Workspace& workspace) const {
   auto& candidates = workspace.get<ContactCandidates<Dim>>();
-  fraction = std::min(fraction, candidates.update(*surface_, x, dx, dhat_, workspace.get<PartOfStep>().motion));
+  fraction = std::min(fraction, candidates.update(*surface_, x, dx, dhat_, workspace.get<PartOfStep>().motion,
+                                                  blocking.takes_first ? fraction : 1));
   struct PairMotion {
     std::array<int, 4> vertices;
     Positions<Dim> from, motion;
@@ -513,18 +543,25 @@ bool ContactEnergy<Dim>::find_blocking(ConstVectorView x, ConstVectorView dx, do
     const int size = pair_size(kind);
     return PairMotion{vertices, gather<Dim>(vertices, size, x), gather<Dim>(vertices, size, dx)};
   };
+  std::vector<StoppedPair> stopped;
   for (const auto& [kind, list] : candidates.all()) {
     const auto& pairs = *list;
-    const auto is_stopped = [&, kind = kind](std::size_t i) {
-      return pair_motion_of(kind, pairs[i]).free_fraction_of(kind, fraction) < 1;
+    const auto free_fraction_of = [&, kind = kind](std::size_t i) {
+      return pair_motion_of(kind, pairs[i]).free_fraction_of(kind, fraction);
     };
-    const auto note = [&, kind = kind](std::size_t i, bool stopped) {
+    const auto note = [&, kind = kind](std::size_t i, double free) {
       const std::array<int, 3> pair{static_cast<int>(kind), pairs[i][0], pairs[i][1]};
-      if (stopped && std::find(blocking.pairs.begin(), blocking.pairs.end(), pair) == blocking.pairs.end())
-        blocking.pairs.push_back(pair);
+      if (free < 1 && std::find(blocking.pairs.begin(), blocking.pairs.end(), pair) == blocking.pairs.end())
+        stopped.push_back({free, pair});
     };
-    parallel_then_ordered<char>(pairs.size(), kBlock, is_stopped, note);
+    parallel_then_ordered<double>(pairs.size(), kBlock, free_fraction_of, note);
   }
+  if (blocking.pairs.size() + stopped.size() > BlockingPairs::kMost) {
+    if (!blocking.takes_first) return false;
+    stopped = first_of_neighbours<Dim>(*surface_, stopped);
+    stopped.resize(std::min(stopped.size(), BlockingPairs::kMost - blocking.pairs.size()));
+  }
+  for (const StoppedPair& one : stopped) blocking.pairs.push_back(one.pair);
   blocking.bounds.clear();
   for (const auto& [kind_index, first, second] : blocking.pairs) {
     const auto kind = static_cast<PairKind>(kind_index);
