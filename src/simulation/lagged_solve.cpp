@@ -285,10 +285,7 @@ class LaggedSolve {
                               const std::function<bool(const VectorX& x)>& ends_at) {
     VectorX d = problem_.increment_of(x);
     const VectorX target = held_.target - base_;
-    EnergySum all = sum;
-    if (const LaggedRegularization& options = setup_.lagged_regularization;
-        setup_.time.is_static && options.weight > 0 && problem_.rounds_ < options.rounds)
-      all.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(regularized_about_, options.weight));
+    EnergySum all = regularized(sum);
     if (least_motion_) {
       all.add(least_motion_);
       follow_least_motion(sum, d);
@@ -330,9 +327,7 @@ class LaggedSolve {
       extras.step_to_start.resize(0);
       close_ties(d, solve, summary);
     }
-    x = base_ + d;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+    x = positions_at(d, target);
     if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
     problem_.solution_ = {x, std::move(d)};
     if (ended_by == EndedBy::caller) return summary;
@@ -343,6 +338,20 @@ class LaggedSolve {
       return summary;
     }
     return explained(std::move(summary), sum, x);
+  }
+  EnergySum regularized(const EnergySum& sum) const {
+    EnergySum all = sum;
+    if (const LaggedRegularization& options = setup_.lagged_regularization;
+        setup_.time.is_static && options.weight > 0 && problem_.rounds_ < options.rounds)
+      all.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(regularized_about_, options.weight));
+    return all;
+  }
+  /// Adds up base and increment; held dofs that have reached their targets are there without round-off.
+  VectorX positions_at(const VectorX& d, const VectorX& target) const {
+    VectorX x = base_ + d;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+    return x;
   }
   /// Solves again with new multipliers until ties have no gaps, beside what solves leave of them.
   template <typename Solve>
