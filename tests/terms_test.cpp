@@ -53,6 +53,8 @@ TrialScene scene_of_all_terms() {
   scene.context.host.push_back(push({1, 0}));
   scene.context.loads.cavities = {{{3}, 0.5, 1, 1.4, 0}};
   scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
+  const auto dofs = scene.fields.x.size() + 2 * static_cast<Eigen::Index>(scene.context.obstacles.rest.size());
+  scene.context.tie = std::make_shared<LinearizedForces<2>>(VectorX(), VectorX::Zero(dofs), 1);
   return scene;
 }
 
@@ -108,6 +110,7 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
       {TermKind::adhesive_friction, [](auto& c) { c.contact.adhesion.iterations = 0; }},
       {TermKind::pressure, [](auto& c) { c.loads.pressures.clear(); }},
       {TermKind::cavity, [](auto& c) { c.loads.cavities.clear(); }},
+      {TermKind::tie, [](auto& c) { c.tie = nullptr; }},
       {TermKind::damping, [](auto& c) { c.damping.clear(); }},
       {TermKind::contact_damping, [](auto& c) { c.damping.clear(); }},
       {TermKind::contact_damping, [](auto& c) { c.contact.enabled = false; }}};

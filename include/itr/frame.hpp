@@ -241,7 +241,7 @@ struct FrameView {
   const AskedFields* asked = nullptr;  ///< null: nothing was asked for
   ProxyView<Dim> proxy{};
   const SetNames* names = nullptr;  ///< of body ids and tags of the mesh; null: there are none
-  double dhat = 0;                  ///< of contact [m]
+  double dhat = 0;                  ///< ContactOptions::reach_of_closed [m]
 };
 
 }  // namespace itr

@@ -131,8 +131,19 @@ struct ContactOptions {
     return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.kinetic < p.statics; });
   }
   AdhesionOptions adhesion{};
+  double tie_reach = 0;  ///< how far surfaces that are tied may overlap, for their meshes do not match [m]; 0: no ties
 
+  /// How far faces that are no contact yet may overlap [m].
+  double reach_of_closed() const { return std::max(dhat, tie_reach); }
   bool has_adhesion() const { return enabled && adhesion.strength > 0; }
+};
+
+// Ties.
+
+/// Surfaces of bodies that are bonded, with any two meshes: boundary facets with these tags. One of them has to cover the
+/// other; small gaps between them at rest stay (docs/theory.md, "Ties").
+struct Tie {
+  std::vector<int> a{}, b{};
 };
 
 // Damping.

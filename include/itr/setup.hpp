@@ -144,6 +144,7 @@ struct ITR_EXPORT StepSetup {
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
   std::vector<Cavity> cavities;
+  std::vector<Tie> ties;
   SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none
 
   std::vector<TermFactory<Dim>> nodal_loads;  ///< dead loads on vertices, as point_forces makes them
@@ -191,6 +192,7 @@ struct ITR_EXPORT Setup : StepSetup<Dim> {
 
   /// Fills in values that are left open and returns a sentence on each. A Simulation calls it.
   ///
+  /// - Ties get ContactOptions::tie_reach, a quarter of the longest edge of what they bond.
   /// - dhat 0 becomes a thousandth of the thinnest body. It is less where edges are short, gaps narrow, or motions that
   ///   are prescribed without inertia small.
   /// - Friction velocity 0 becomes in dynamics a part of the speed that the scene is driven with. Without inertia each step

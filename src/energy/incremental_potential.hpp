@@ -71,6 +71,7 @@ class IncrementalPotential {
     visit(TermKind::adhesive_friction, lagged.adhesive_friction);
     visit(TermKind::pressure, lagged.pressure);
     for (const auto& term : cavities_) visit(TermKind::cavity, term);
+    visit(TermKind::tie, terms_->tie);
     for (const auto& term : lagged.damping) visit(TermKind::damping, term);
     for (const auto& term : lagged.contact_damping) visit(TermKind::contact_damping, term);
   }

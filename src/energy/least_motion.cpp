@@ -82,9 +82,15 @@ std::vector<Vec<Dim>> centres_of_mass(const CellSet<Dim>& cells, const LoosePart
 
 /// All connected parts, loose or not.
 template <int Dim>
-LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Material>& materials) {
+LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Material>& materials,
+                           std::span<const std::vector<int>> bonds) {
   std::vector<std::array<int, Dim + 1>> corners;
   for (const auto& element : cells.elements) corners.push_back(element.vertices);
+  for (const std::vector<int>& bond : bonds)
+    for (const int node : bond) {
+      corners.emplace_back().fill(node);
+      corners.back().front() = bond.front();
+    }
   const std::vector<int> part_of_vertex =
       connected_parts<Dim + 1>(cells.rest.size(), std::span<const std::array<int, Dim + 1>>(corners));
   LooseParts<Dim> all;
@@ -115,8 +121,8 @@ LooseParts<Dim> find_parts(const CellSet<Dim>& cells, const std::map<int, Materi
 
 template <int Dim>
 LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, const std::vector<char>& held,
-                                 const std::map<int, Material>& materials) {
-  LooseParts<Dim> all = find_parts(cells, materials);
+                                 const std::map<int, Material>& materials, std::span<const std::vector<int>> bonds) {
+  LooseParts<Dim> all = find_parts(cells, materials, bonds);
   const std::vector<Vec<Dim>> centres = centres_of_mass(cells, all, x);
   std::vector<LoosePart<Dim>> loose;
   std::vector<int> number(all.parts.size(), kNone);
@@ -214,7 +220,7 @@ MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) c
 #define ITR_INSTANTIATE(Dim)                                                                                     \
   template class LeastMotion<Dim>;                                                                               \
   template LooseParts<Dim> find_loose_parts<Dim>(const CellSet<Dim>&, ConstVectorView, const std::vector<char>&, \
-                                                 const std::map<int, Material>&);
+                                                 const std::map<int, Material>&, std::span<const std::vector<int>>);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <vector>
 
 #include "energy/energy.hpp"
@@ -58,9 +59,9 @@ class LeastMotion final : public Energy {
 };
 
 /// The connected parts of which `held` dofs leave a rigid motion free, at positions x. A rank of conditions, not a count:
-/// rollers and single points hold what they hold.
+/// rollers and single points hold what they hold. Each of `bonds` makes one part of those that its nodes are of.
 template <int Dim>
 LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, const std::vector<char>& held,
-                                 const std::map<int, Material>& materials);
+                                 const std::map<int, Material>& materials, std::span<const std::vector<int>> bonds = {});
 
 }  // namespace itr

@@ -37,6 +37,7 @@ struct PotentialTerms {
   double t = 0;                         ///< at the end of the step, for them [s]
   /// Its forces of positions, linearised at those of the cells' vertices; empty: none. On the whole mesh only.
   std::function<std::shared_ptr<const Energy>(const VectorX& x)> follower;
+  std::shared_ptr<const Energy> tie{};  ///< on the whole mesh only: in patches its forces are tractions; null: none
 };
 
 /// In the order in which they are summed.
@@ -52,10 +53,11 @@ enum class TermKind {
   adhesive_friction,
   pressure,
   cavity,
+  tie,
   damping,
   contact_damping
 };
-inline constexpr std::size_t kNumTermKinds = 13;
+inline constexpr std::size_t kNumTermKinds = 14;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -186,6 +188,11 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .is_in = [](const PotentialTerms<Dim>& terms) { return !terms.loads.cavities.empty(); },
      .energy = EnergyEntry::body,
      .force = ForceEntry::applied},
+    {.kind = TermKind::tie,  // quadratic in the gaps of what is bonded, less what its multipliers add
+     .is_in = [](const PotentialTerms<Dim>& terms) { return static_cast<bool>(terms.tie); },
+     .energy = EnergyEntry::elastic,
+     .force = ForceEntry::contact,
+     .is_bounded = [](const PotentialTerms<Dim>&) { return true; }},
     {.kind = TermKind::damping,
      .is_in = [](const PotentialTerms<Dim>& terms) { return has_damping(terms, DampingOptions::Term::elastic); },
      .energy = EnergyEntry::damping,

@@ -67,6 +67,12 @@ std::vector<Stencils> element_stencils(const CellSet<Dim>& cells) {
   return stencils;
 }
 
+/// Rest positions of all vertices, interleaved.
+template <int Dim>
+VectorX rest_positions(const CellSet<Dim>& cells) {
+  return Eigen::Map<const VectorX>(cells.rest[0].data(), Dim * static_cast<Eigen::Index>(cells.rest.size()));
+}
+
 template <int Dim>
 Vec<Dim> rest_barycenter(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
   Vec<Dim> sum = Vec<Dim>::Zero();

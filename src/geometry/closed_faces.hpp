@@ -20,7 +20,7 @@ double simplex_distance_squared(const std::array<Vec<Dim>, N>& a, const std::arr
 struct ClosedFaces {
   std::vector<char> is_closed;  ///< by vertex of the surface's problem; empty: no face is closed
   VectorX rest;                 ///< of these vertices, interleaved [m]
-  double dhat = 0;              ///< [m]
+  double dhat = 0;              ///< what they may overlap by: d-hat, or the reach of ties [m]
   double coincident = 0;        ///< what is as near as that at rest coincides there, but for round-off [m]
 
   bool empty() const { return is_closed.empty(); }

@@ -60,6 +60,7 @@ struct StepContext : PotentialTerms<Dim> {
   std::map<int, std::array<bool, Dim>> held_components;  ///< by tag of facets and vertices
   NewtonOptions newton;
   double shortest_edge = 0, longest_edge = 0;  ///< of the initial mesh [m]
+  std::vector<int> kept_surfaces{};            ///< tags of boundary facets that no edit changes
   /// Energy of the terms between bodies, contact and friction, in the solution that is remeshed [J s^2]; infinity: not
   /// known.
   double coupling = std::numeric_limits<double>::infinity();

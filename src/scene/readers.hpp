@@ -125,4 +125,10 @@ template <int Dim>
 std::vector<FrictionPair> read_friction_pairs(const Node& root, const PartNames& parts, const Sets& sets,
                                               const Mesh<Dim>& mesh);
 
+// `/ties`.
+
+/// Throws InputError for ids that no surface of a body has, and for one that both sides have.
+template <int Dim>
+std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh);
+
 }  // namespace itr::scene

@@ -100,6 +100,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   setup.materials = read_materials(root, sets.bodies, setup.mesh, warnings);
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   read_preset_problem<Dim>(root, sets.bodies, setup);
+  setup.ties = read_ties<Dim>(root, sets, setup.mesh);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 

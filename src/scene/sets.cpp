@@ -50,6 +50,8 @@ References collect_references(const Node& root) {
       for (auto* labels : {&references.bodies, &references.surfaces}) add_labels(entry[side], *labels);
   for (const Node& entry : root["boundary_conditions"]["pressure_cavity"].items())
     add_labels(entry["id"], references.surfaces);
+  for (const Node& entry : root["ties"].items())
+    for (const char* side : {"a", "b"}) add_labels(entry[side], references.surfaces);
   for (const Node& entry : root["output"]["forces"].items()) {
     add_labels(entry["bodies"], references.bodies);
     add_labels(entry["surfaces"], references.surfaces);

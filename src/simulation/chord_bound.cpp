@@ -55,7 +55,7 @@ class ChordBound {
       : setup_(setup), mesh_(mesh), levels_(levels), x_(x), chords_(chords), own_(static_cast<int>(chords_.facets.size())) {
     const int nodes = mesh.num_nodes();
     if (has_closed_faces(mesh, age))
-      closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.dhat, coincidence(mesh),
+      closed_ = closed_faces<Dim>(mesh.rest(), setup.contact.reach_of_closed(), coincidence(mesh),
                                   [&](int node) { return is_closed(mesh, node, age); });
     points_.reserve(chords_.points.size());
     for (const auto& weights : chords_.points) points_.push_back(combined<Dim>(weights, [&](int node) { return at(node); }));

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/closed_faces.hpp"
 
+#include <set>
 #include <vector>
 
 #include "energy/contact/candidates.hpp"
 #include "energy/contact/pairs.hpp"
 #include "mesh/rest_box.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
@@ -48,6 +50,20 @@ std::vector<char> closed_nodes(const Mesh<Dim>& mesh) {
   return closed;
 }
 
+/// By vertex, whether it is of a facet that a tie may bond: where it is closed it stays so.
+template <int Dim>
+std::vector<char> tied_vertices(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
+  std::vector<char> tied(mesh.num_vertices(), 0);
+  std::set<int> tags;
+  for (const Tie& tie : setup.ties)
+    for (const auto* side : {&tie.a, &tie.b}) tags.insert(side->begin(), side->end());
+  if (tags.empty()) return tied;
+  for (const FacetId f : mesh.live_facets())
+    if (tags.contains(mesh.facet_tag(f)))
+      for (const VertexId v : mesh.facet(f)) tied[v] = 1;
+  return tied;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -73,6 +89,9 @@ double coincidence(const Mesh<Dim>& mesh) {
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
   if (!setup.contact.enabled || setup.proxy) return;
+  const CellSet<Dim> cells = setup.ties.empty() ? CellSet<Dim>() : whole_mesh(mesh, {});
+  for (const auto& mortar : mortars_of(setup, mesh, cells))
+    for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
   const std::vector<char> all(mesh.num_nodes(), 1);
   for_each_coincident_pair<Dim>(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
     for (int k = 0; k < pair_size(kind); ++k)
@@ -81,10 +100,17 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
+bool has_only_tied_faces(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
+  const std::vector<char> tied = tied_vertices(setup, mesh);
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    if (mesh.steps_apart(v) == 0 && !tied[v]) return false;
+  return true;
+}
+
+template <int Dim>
 void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh) {
-  const bool has_closed = has_closed_faces(mesh);
-  std::vector<char> stay(mesh.num_vertices(), 0);
-  if (has_closed) {
+  std::vector<char> stay = tied_vertices(setup, mesh);
+  if (has_closed_faces(mesh) && !has_only_tied_faces(setup, mesh)) {
     const double dhat = setup.contact.dhat;
     const auto visit = [&](PairKind kind, const std::array<int, 4>& vertices) {
       if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), x).data()) >= dhat * dhat) return;
@@ -116,6 +142,7 @@ Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
   template bool has_closed_faces(const Mesh<Dim>&, int);                                           \
   template double coincidence(const Mesh<Dim>&);                                                   \
   template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
+  template bool has_only_tied_faces(const StepSetup<Dim>&, const Mesh<Dim>&);                      \
   template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
   template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

@@ -18,9 +18,14 @@ bool has_closed_faces(const Mesh<Dim>& mesh, int age = 0);
 template <int Dim>
 double coincidence(const Mesh<Dim>& mesh);
 
-/// Closes the faces of bodies that coincide at rest; does nothing where a proxy touches in their place, or without contact.
+/// Closes the faces of bodies that coincide at rest, and those that ties bond; does nothing where a proxy touches in their
+/// place, or without contact.
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh);
+
+/// Whether ties bond all faces that are closed.
+template <int Dim>
+bool has_only_tied_faces(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 
 /// At the end of a step, with bodies at x: opens faces that are apart by d-hat, and counts a step for those that were open.
 template <int Dim>

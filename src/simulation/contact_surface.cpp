@@ -84,7 +84,7 @@ ClosedFaces closed_faces_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, 
   std::vector<Vec<Dim>> rest = mesh.rest();
   rest.insert(rest.end(), setup.obstacles.rest.begin(), setup.obstacles.rest.end());
   const auto is_node_closed = [&](int node) { return node < mesh.num_nodes() && is_closed(mesh, node, age); };
-  ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.dhat, coincidence(mesh), is_node_closed);
+  ClosedFaces faces = closed_faces<Dim>(rest, setup.contact.reach_of_closed(), coincidence(mesh), is_node_closed);
   if (!contact.map) return faces;
   faces.rest = contact.positions(faces.rest);
   faces.is_closed.resize(contact.surface.area.size());

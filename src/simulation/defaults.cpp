@@ -173,7 +173,7 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
     Mesh<Dim> mesh = setup.mesh;
     close_coincident_faces(setup, mesh);
     ContactSurface<Dim> surface = contact_surface(setup, mesh);
-    surface.surface.closed.dhat = dhat;
+    surface.surface.closed.dhat = contact.reach_of_closed();
     gap = ContactEnergy<Dim>(surface.surface, contact, 1, 1).min_distance(start, workspace);
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }
@@ -182,6 +182,16 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
       units.text(dhat, "m"), by_thickness, units.text(thinnest, "m"), units.text(shortest, "m"),
       std::isfinite(motion) ? ", at most a hundredth of what is prescribed, " + units.text(motion, "m") : "",
       std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
+}
+
+/// How far surfaces that are tied may overlap where they bend [m].
+template <int Dim>
+double tie_reach(const Setup<Dim>& setup) {
+  constexpr double kByEdge = 0.25;
+  const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
+  double longest = 0;
+  for (const auto& mortar : mortars_of(setup, setup.mesh, cells)) longest = std::max(longest, mortar.longest_edge);
+  return kByEdge * longest;
 }
 
 /// Chooses the split tolerance [J], and says so.
@@ -233,6 +243,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   std::vector<std::string> words;
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
+  if (contact.enabled && !this->ties.empty()) contact.tie_reach = tie_reach(*this);
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)

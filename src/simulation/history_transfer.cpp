@@ -102,7 +102,7 @@ class HistoryTransfer {
     PatchSurface<Dim> surface;
     CellSet<Dim> cells = patch_.cells;
     if (setup_.contact.enabled) {
-      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.dhat, age);
+      surface = patch_surface(mesh_, setup_.obstacles, patch_, moving, field, goal, setup_.contact.reach_of_closed(), age);
       cells.num_vertices += static_cast<int>(surface.others.size());
       interpolant.conservativeResize(Dim * cells.num_vertices);
       for (std::size_t i = 0; i < surface.others.size(); ++i)

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "energy/tie.hpp"
 #include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
@@ -37,7 +38,8 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   if (!has_closed_faces(state.mesh)) {
     for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords); overlap.depth > setup.contact.dhat) {
+  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
+             overlap.depth > setup.contact.reach_of_closed()) {
     refuse("a body", overlap.place);
   }
   for (Eigen::Index i = Dim * state.mesh.num_nodes(); i < x.size(); i += Dim)
@@ -138,6 +140,27 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
 }
 
 template <int Dim>
+void refuse_open_ties(const Setup<Dim>& setup, const State<Dim>& state) {
+  constexpr double kOpen = 1e-6;  // of the largest value
+  if (setup.ties.empty()) return;
+  const CellSet<Dim> cells = whole_mesh(state.mesh, setup.obstacles.rest);
+  const std::vector<Mortar<Dim>> mortars = mortars_of(setup, state.mesh, cells);
+  const TieEnergy<Dim> tie(cells, mortars, setup.materials, false, 1);
+  const VectorX u = state.history.x[0] - rest_positions<Dim>(cells);
+  const auto check = [&](const char* place, const VectorX& field) {
+    const double size = field.size() > 0 ? field.template lpNorm<Eigen::Infinity>() : 0;
+    if (size == 0) return;
+    if (const double open = tie.largest_gap(field); open > kOpen * size)
+      throw InputError({"", std::string("/initial_conditions/") + place,
+                        fmt::format("values that differ by {:.3g} of the largest one across /ties", open / size),
+                        "values that are the same on both sides of what is tied"});
+  };
+  check("solution", u);
+  if (setup.time.has_inertia()) check("velocity", state.history.v[0]);
+  if (!state.history.a.empty()) check("acceleration", state.history.a[0]);
+}
+
+template <int Dim>
 Mesh<Dim> initial_mesh(const Setup<Dim>& setup) {
   Mesh<Dim> mesh = setup.mesh;
   mesh.compact();
@@ -227,6 +250,7 @@ void set_consistent_acceleration(const Setup<Dim>& setup, State<Dim>& state, Pro
   template Mesh<Dim> initial_mesh(const Setup<Dim>&);                       \
   template State<Dim> initial_state(const Setup<Dim>&);                     \
   template void refuse_intersections(const Setup<Dim>&, const State<Dim>&); \
+  template void refuse_open_ties(const Setup<Dim>&, const State<Dim>&);     \
   template void refuse_misfit(const Setup<Dim>&, const State<Dim>&);        \
   template void set_consistent_acceleration(const Setup<Dim>&, State<Dim>&, ProblemCache<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

@@ -21,6 +21,10 @@ Mesh<Dim> initial_mesh(const Setup<Dim>& setup);
 template <int Dim>
 void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state);
 
+/// Throws InputError for displacements, velocities or accelerations that tear ties.
+template <int Dim>
+void refuse_open_ties(const Setup<Dim>& setup, const State<Dim>& state);
+
 /// Throws InputError for a state that no steps of this setup lead to.
 template <int Dim>
 void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state);

@@ -41,7 +41,7 @@ std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   if (const CellId c = find_inverted(mesh, x); c != kNone) return "cell " + std::to_string(c) + " is inverted";
   if (!setup.contact.enabled) return {};
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
-  const double dhat = setup.contact.dhat;
+  const double dhat = setup.contact.reach_of_closed();
   const bool has_closed = !contact.surface.closed.empty();
   const auto overlap = has_closed ? body_boundary(mesh, x, chords).find_overlap(contact.surface.closed) : Overlap<Dim>{};
   if (overlap.depth > dhat && std::isfinite(overlap.depth)) return pressed_faces(overlap, dhat, setup.units);

@@ -285,10 +285,7 @@ class LaggedSolve {
                               const std::function<bool(const VectorX& x)>& ends_at) {
     VectorX d = problem_.increment_of(x);
     const VectorX target = held_.target - base_;
-    EnergySum all = sum;
-    if (const LaggedRegularization& options = setup_.lagged_regularization;
-        setup_.time.is_static && options.weight > 0 && problem_.rounds_ < options.rounds)
-      all.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(regularized_about_, options.weight));
+    EnergySum all = regularized(sum);
     if (least_motion_) {
       all.add(least_motion_);
       follow_least_motion(sum, d);
@@ -322,10 +319,15 @@ class LaggedSolve {
       options.force_tolerance = std::max(options.force_tolerance, loose_force_);
       extras.must_be_minimum = false;
     }
-    NewtonSummary summary = minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
-    x = base_ + d;
-    for (Eigen::Index i = 0; i < x.size(); ++i)
-      if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+    const auto solve = [&] {
+      return minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
+    };
+    NewtonSummary summary = solve();
+    if (problem_.tie_ && ended_by == EndedBy::solver) {
+      extras.step_to_start.resize(0);
+      close_ties(d, solve, summary);
+    }
+    x = positions_at(d, target);
     if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
     problem_.solution_ = {x, std::move(d)};
     if (ended_by == EndedBy::caller) return summary;
@@ -336,6 +338,44 @@ class LaggedSolve {
       return summary;
     }
     return explained(std::move(summary), sum, x);
+  }
+  EnergySum regularized(const EnergySum& sum) const {
+    EnergySum all = sum;
+    if (const LaggedRegularization& options = setup_.lagged_regularization;
+        setup_.time.is_static && options.weight > 0 && problem_.rounds_ < options.rounds)
+      all.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(regularized_about_, options.weight));
+    return all;
+  }
+  /// Adds up base and increment; held dofs that have reached their targets are there without round-off.
+  VectorX positions_at(const VectorX& d, const VectorX& target) const {
+    VectorX x = base_ + d;
+    for (Eigen::Index i = 0; i < x.size(); ++i)
+      if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
+    return x;
+  }
+  /// Solves again with new multipliers until ties have no gaps, beside what solves leave of them.
+  template <typename Solve>
+  void close_ties(const VectorX& d, const Solve& solve, NewtonSummary& summary) {
+    constexpr double kTieTolerance = 1e-7;  // of the tractions
+    constexpr double kSlow = 0.1, kFactor = 10;
+    constexpr int kMostTieRounds = 20;
+    TieEnergy<Dim>& tie = *problem_.tie_;
+    double error = tie.error_at({base_, d});
+    for (int round = 0; summary.converged() && error > kTieTolerance; ++round) {
+      if (round == kMostTieRounds) {
+        summary.termination = Termination::lagging;
+        summary.message =
+            fmt::format("tied surfaces stay apart by {}: conditions may hold both sides in different places",
+                        setup_.units.text(tie.largest_gap(VectorX(base_ + d - rest_positions<Dim>(cells_))), "m", 3));
+        return;
+      }
+      tie.update({base_, d});
+      NewtonSummary next = solve();
+      next.add_effort(summary);
+      summary = std::move(next);
+      const double before = std::exchange(error, tie.error_at({base_, d}));
+      if (error > kSlow * before && round % 2 == 1) tie.stiffen(kFactor);
+    }
   }
   /// Lets a solve from the increment d be primal-dual in friction.
   void follow_friction(const VectorX& d, NewtonExtras& extras) {

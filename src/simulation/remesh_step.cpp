@@ -156,6 +156,11 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
     for (const int tag : cavity.surfaces)
       context.loads.pressures.emplace_back(
           tag, [p = CavityEnergy<Dim>(cells, cavity, 1).pressure(x)](const RestPoint<Dim>&) { return p; });
+  for (auto& traction : problem.tie_tractions()) context.loads.tractions.push_back(std::move(traction));
+  if (setup.time.has_inertia())  // past positions and velocities would have gaps on other meshes
+    for (const Tie& tie : setup.ties)
+      for (const auto* side : {&tie.a, &tie.b})
+        context.kept_surfaces.insert(context.kept_surfaces.end(), side->begin(), side->end());
   if (setup.follower.forces) {
     const int dofs = Dim * state.mesh.num_nodes();
     VectorX forces = VectorX::Zero(dofs);

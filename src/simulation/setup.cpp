@@ -10,8 +10,11 @@
 #include <set>
 
 #include "energy/cavity.hpp"
+#include "energy/mortar.hpp"
 #include "itr/core.hpp"
+#include "mesh/facet_tags.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
@@ -201,6 +204,33 @@ void check_cavities(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
+void check_ties(const Setup<Dim>& setup) {
+  if (setup.ties.empty()) return;
+  const std::set<int> with_facets = facet_tags(setup.mesh);
+  for (std::size_t i = 0; i < setup.ties.size(); ++i)
+    for (const auto& [key, tags] : {std::pair{"a", &setup.ties[i].a}, std::pair{"b", &setup.ties[i].b}}) {
+      if (tags->empty()) refuse(fmt::format("/ties/{}/{}", i, key), "no surfaces", "at least one");
+      for (const int tag : *tags)
+        if (!with_facets.contains(tag))
+          refuse(fmt::format("/ties/{}/{}", i, key), fmt::format("{}, which no surface has", tag), "the id of a surface");
+    }
+  const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
+  const std::vector<Mortar<Dim>> mortars = mortars_of(setup, setup.mesh, cells);
+  for (std::size_t i = 0; i < mortars.size(); ++i)
+    if (mortars[i].covered == 0)
+      refuse(fmt::format("/ties/{}", i),
+             fmt::format("surfaces that are {} apart, or do not face each other",
+                         setup.units.text(distance_of_sides(cells, setup.ties[i]), "m", 3)),
+             "surfaces that touch, or are apart by less than a tenth of their edges");
+    else if (mortars[i].covered < kLeastCovered)
+      refuse(
+          fmt::format("/ties/{}", i),
+          fmt::format("surfaces of which neither covers the other: at most {:.1f} % of one side", 100 * mortars[i].covered),
+          fmt::format("one side that the other covers, by {:g} % at least: give the part that is bonded an id of its own",
+                      100 * kLeastCovered));
+}
+
+template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
   const CollisionProxy<Dim>& proxy = *setup.proxy;
@@ -245,6 +275,7 @@ void Setup<Dim>::validate() const {
   check_materials(*this);
   check_proxy(*this);
   check_cavities(*this);
+  check_ties(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
   for (const auto& [name, list] :

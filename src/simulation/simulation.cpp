@@ -286,6 +286,7 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   auto state = std::make_shared<State<Dim>>(initial_state(impl_->setup));
   impl_->initial_edges = edge_lengths(state->mesh);
   refuse_intersections(impl_->setup, *state);
+  refuse_open_ties(impl_->setup, *state);
   if (impl_->setup.consistent_initial_acceleration && !state->history.a.empty())
     set_consistent_acceleration(impl_->setup, *state, *impl_->cache);
   impl_->state = std::move(state);
@@ -458,7 +459,7 @@ void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
                        data.elastic_density,      data.obstacle_x, setup.obstacles.edges,
                        setup.obstacles.triangles, &data.asked};
   frame.names = &setup.names;
-  frame.dhat = setup.contact.dhat;
+  frame.dhat = setup.contact.reach_of_closed();
   if (setup.proxy) frame.proxy = {&data.proxy_x, &setup.proxy->edges, &setup.proxy->triangles};
   observer(frame);
 }

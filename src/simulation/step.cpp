@@ -336,7 +336,7 @@ class StepSolver {
 
   /// Warns where faces that are no contact begin to be pressed into each other.
   void tell_of_closed_faces() const {
-    if (!has_closed_faces(next_.mesh)) return;
+    if (has_only_tied_faces(setup_, next_.mesh)) return;
     const auto depth_of = [&](const State<Dim>& state, const VectorX& x) {
       return find_overlap(setup_, state.mesh, x, state.chords).depth;
     };

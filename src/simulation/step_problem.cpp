@@ -25,7 +25,8 @@ MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
     : mesh_revision(mesh.revision()),
       chords(chords),
       cells(whole_mesh(mesh, setup.obstacles.rest)),
-      diagonal(rest_diagonal(mesh)) {
+      diagonal(rest_diagonal(mesh)),
+      mortars(mortars_of(setup, mesh, cells)) {
   add_patches(setup.materials, cells);
   if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
 }
@@ -95,10 +96,26 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   if (!history.v.empty()) last_motion_ = relative_motion<Dim>(history.v[0]) * setup.time.dt;
   if (!history.v.empty() && setup.contact.has_static_friction()) start_velocity_ = history.v[0];
   potential_.elastic()->set_quadrature_levels(levels);
+  add_ties(history);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
-    if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials); !loose.empty())
+    if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials,
+                                           tie_ ? tie_->bonds() : std::vector<std::vector<int>>());
+        !loose.empty())
       least_motion_ = std::make_shared<LeastMotion<Dim>>(cells_, std::move(loose), terms_.scaling);
   reset_system();
+}
+
+/// By the trapezoidal rule a gap at the start of a step that ends without one would leave a velocity that changes its sign
+/// in each step: half of the gap and of the way that its velocity goes in half a step are left, of which nothing is left
+/// after two steps.
+template <int Dim>
+void StepProblem<Dim>::add_ties(const History& history) {
+  if (scope_->mortars.empty()) return;
+  tie_ = std::make_shared<TieEnergy<Dim>>(cells_, scope_->mortars, setup_.materials, terms_.has_inertia, terms_.scaling);
+  terms_.tie = tie_;
+  if (terms_.has_inertia && TimeIntegrator(setup_.time).is_trapezoidal(history))
+    tie_->add_targets(0.5, VectorX(base_ - rest_positions<Dim>(cells_) + setup_.time.dt / 2 * history.v[0]));
+  tie_->begin_at(base_);
 }
 
 template <int Dim>
@@ -313,6 +330,11 @@ typename StepProblem<Dim>::TermAt StepProblem<Dim>::friction_at(const VectorX& x
   at.value = lagged.friction->value(x, workspace_);
   lagged.friction->add_gradient(x, at.gradient, workspace_);
   return at;
+}
+
+template <int Dim>
+std::vector<TractionOfTie<Dim>> StepProblem<Dim>::tie_tractions() const {
+  return tie_ ? tie_->tractions() : std::vector<TractionOfTie<Dim>>();
 }
 
 template <int Dim>

@@ -7,6 +7,7 @@
 #include "energy/contact/stiffness.hpp"
 #include "energy/incremental_potential.hpp"
 #include "energy/least_motion.hpp"
+#include "energy/tie.hpp"
 #include "itr/frame.hpp"
 #include "itr/setup.hpp"
 #include "newton/newton.hpp"
@@ -27,9 +28,10 @@ struct MeshScope {
   std::uint64_t mesh_revision;
   ChordLevels chords;
   CellSet<Dim> cells;
-  ContactSurface<Dim> surface;  ///< empty without contact
-  double diagonal;              ///< of the bodies at rest [m]
-  Workspace workspace;          ///< search trees of the surface
+  ContactSurface<Dim> surface;       ///< empty without contact
+  double diagonal;                   ///< of the bodies at rest [m]
+  std::vector<Mortar<Dim>> mortars;  ///< one a tie
+  Workspace workspace;               ///< search trees of the surface
 };
 
 /// Data that a simulation keeps from step to step, so that they are not made again: they change no result, only the time.
@@ -132,6 +134,8 @@ class StepProblem {
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_.surface; }
   double scaling() const { return terms_.scaling; }
+  /// The tractions by which ties act on both surfaces, in the last solution.
+  std::vector<TractionOfTie<Dim>> tie_tractions() const;
   double friction_velocity() const { return terms_.contact.friction_velocity; }  ///< eps_v of the last solve [m/s]
 
  private:
@@ -144,6 +148,7 @@ class StepProblem {
   VectorX contact_gradient(const VectorX& x);
   void find_impact(const History& history, const VectorX& x, const VectorX& v, const VectorX& before, const VectorX& now,
                    TimeErrors& errors);
+  void add_ties(const History& history);
   void reset_system();
   SparseSystem& system();
   /// Adds what is never assembled to it.
@@ -163,6 +168,7 @@ class StepProblem {
   struct Solution {
     VectorX x, increment;
   };
+  std::shared_ptr<TieEnergy<Dim>> tie_;               ///< null: there are no ties
   std::shared_ptr<LeastMotion<Dim>> least_motion_;    ///< null: inertia or conditions hold all bodies
   VectorX base_;                                      ///< positions at the start of the step
   Solution solution_;                                 ///< of the last solve

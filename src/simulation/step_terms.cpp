@@ -108,6 +108,16 @@ HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, doub
 }
 
 template <int Dim>
+std::vector<Mortar<Dim>> mortars_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const CellSet<Dim>& cells) {
+  if (setup.ties.empty()) return {};
+  const auto components = held_components(setup);
+  const HeldRule<Dim> rule(components);
+  return make_mortars<Dim>(cells, setup.ties, [&](int node, int c) {
+    return rule.tags_of_node(mesh, node)[c] != kNoTag || (c == 0 && mesh.is_on_axis(node));
+  });
+}
+
+template <int Dim>
 double relative_motion(const VectorX& motions) {
   Eigen::AlignedBox<double, Dim> box;
   for (Eigen::Index i = 0; i < motions.size(); i += Dim) box.extend(Vec<Dim>(motions.segment<Dim>(i)));
@@ -147,14 +157,15 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .follower = {}};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                              \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                       \
-  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                      \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool); \
-  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                            \
-  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                         \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                 \
-  template double relative_motion<Dim>(const VectorX&);                                                   \
+#define ITR_INSTANTIATE(Dim)                                                                                       \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                                \
+  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                               \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool);          \
+  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                                     \
+  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                                  \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                          \
+  template std::vector<Mortar<Dim>> mortars_of<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const CellSet<Dim>&); \
+  template double relative_motion<Dim>(const VectorX&);                                                            \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

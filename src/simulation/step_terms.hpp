@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "energy/mortar.hpp"
 #include "energy/terms.hpp"
 #include "fem/held_rule.hpp"
 #include "itr/setup.hpp"
@@ -42,6 +43,10 @@ typename HeldRule<Dim>::Components held_components(const StepSetup<Dim>& setup);
 
 template <int Dim>
 HeldDofs<Dim> held_dofs(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, double t);
+
+/// The mortars of a setup's ties on `cells`, those of the mesh.
+template <int Dim>
+std::vector<Mortar<Dim>> mortars_of(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const CellSet<Dim>& cells);
 
 /// Diagonal of the box of all motions, of bodies and obstacles [m].
 template <int Dim>

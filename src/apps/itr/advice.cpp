@@ -215,7 +215,12 @@ template <int Dim>
 std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   const Mesh<Dim>& mesh = setup.mesh;
   const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
-  const std::vector<int> part = connected_parts<2>(mesh.node_slots(), mesh.edges());
+  std::vector<EdgeKey> edges = mesh.edges();
+  const CellSet<Dim> cells = setup.ties.empty() ? CellSet<Dim>() : whole_mesh(mesh, {});
+  for (const auto& mortar : mortars_of(setup, mesh, cells))
+    for (const auto& row : mortar.rows)
+      for (const int node : row.nodes) edges.push_back({row.nodes.front(), node});
+  const std::vector<int> part = connected_parts<2>(mesh.node_slots(), edges);
   std::set<int> fixed, loose, bodies;
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)

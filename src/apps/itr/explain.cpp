@@ -165,6 +165,7 @@ class Explanation {
                               cavity.bulk_modulus > 0 ? "fluid" : fmt::format("gas, exponent {}", cavity.exponent));
     term("cavities", !setup_.cavities.empty(),
          setup_.cavities.empty() ? "no /boundary_conditions/pressure_cavity" : cavities);
+    term("ties", !setup_.ties.empty(), setup_.ties.empty() ? "no /ties" : std::to_string(setup_.ties.size()) + " pairs");
     term("contact", setup_.contact.enabled,
          !setup_.contact.enabled     ? "/contact/enabled is false"
          : setup_.contact.convergent ? "convergent form"

@@ -165,8 +165,8 @@ void LocalProblem<Dim>::add_surface() {
   dofs_.unknown.resize(Dim * vertices_.size(), kNone);
   changes_.resize(vertices_.size(), 0);
   surface.counts = changes_;
-  surface.closed =
-      closed_faces<Dim>(cells_.rest, state_.context.contact.dhat, 0, [&](int i) { return is_closed(vertices_[i]); });
+  surface.closed = closed_faces<Dim>(cells_.rest, state_.context.contact.reach_of_closed(), 0,
+                                     [&](int i) { return is_closed(vertices_[i]); });
   surface.friction_sides.clear();
   if (!state_.context.contact.friction_pairs.empty())
     for (const LocalVertex& v : vertices_) surface.friction_sides.push_back(friction_sides_of(v));

@@ -241,12 +241,27 @@ double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) 
   return nu;
 }
 
+/// Whether the edit changes facets, or curves along facets, of surfaces that are kept.
+template <int Dim>
+bool changes_kept(const Mesh<Dim>& mesh, const Edit<Dim>& edit, const std::vector<int>& kept) {
+  if (kept.empty()) return false;
+  const auto is_kept = [&](FacetId f) { return std::ranges::find(kept, mesh.facet_tag(f)) != kept.end(); };
+  const auto is_old = [&](VertexId v) { return v >= 0 && v < mesh.node_slots(); };
+  const auto is_along = [&](const EdgeKey& edge) {
+    return is_old(edge[0]) && is_old(edge[1]) && std::ranges::any_of(mesh.facets_of_edge(edge), is_kept);
+  };
+  return std::ranges::any_of(edit.removed_facets, is_kept) || std::ranges::any_of(edit.removed_nodes, is_along) ||
+         std::ranges::any_of(edit.inserted_nodes, [&](const auto& node) { return is_along(node.edge); }) ||
+         (edit.value && is_old(edit.value->vertex) && std::ranges::any_of(mesh.facets_of(edit.value->vertex), is_kept));
+}
+
 template <int Dim>
 void RemeshQueries<Dim>::judge(Trial<Dim>& trial, const LocalRelaxationOptions& local, LocalScratch<Dim>& scratch) const {
   const ScopedTimer timer(trial.seconds);
   const auto phase = ScopedPhase::coarse("local trials");
   const RemeshState<Dim> state = this->state();
   const Edit<Dim>& edit = *trial.edit;
+  if (changes_kept(mesh_, edit, context_.kept_surfaces)) return trial.refuse(Refusal::held);
   const bool moves = edit.kind == Edit<Dim>::Kind::smooth;
   const bool is_refined = edit.kind == Edit<Dim>::Kind::split || edit.kind == Edit<Dim>::Kind::curve;
   TrialOptions options{.required = context_.scaling * trial.tolerance, .local = local};

@@ -45,8 +45,8 @@ std::vector<double> vertex_contact_energies(const Mesh<Dim>& mesh, const RemeshF
   std::vector<Vec<Dim>> rest = mesh.rest();
   CollisionSurface surface = surface_of_facets<Dim>(chords, rest, obstacles, mesh.is_axisymmetric());
   rest.insert(rest.end(), obstacles.rest.begin(), obstacles.rest.end());
-  surface.closed =
-      closed_faces<Dim>(rest, context.contact.dhat, 0, [&](int v) { return v < bodies && mesh.steps_apart(v) == 0; });
+  surface.closed = closed_faces<Dim>(rest, context.contact.reach_of_closed(), 0,
+                                     [&](int v) { return v < bodies && mesh.steps_apart(v) == 0; });
   const ContactEnergy<Dim> contact(surface, context.contact, 1, context.scaling);
   Workspace workspace;
   for (const auto& s : contact.active(x, workspace)) {
