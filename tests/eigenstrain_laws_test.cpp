@@ -97,7 +97,7 @@ TEST(Eigenstrain, PlaneStrainIsTheLawInSpace) {
   EXPECT_GE(compared, 10);
 }
 
-/// What cells keep and what patches average add up to the law.
+/// Parts that cells keep and that patches average add up to the law.
 TYPED_TEST(EigenstrainOfLaws, PartsOfTheVolumeAddUp) {
   constexpr int Dim = TypeParam::value;
   std::mt19937 random(7);

@@ -11,7 +11,7 @@ namespace {
 
 class EigenstrainScene : public SceneTest {
  protected:
-  /// Of the entry of `square` with these changes, at X and t.
+  /// The strain of the entry of `square` with these changes, at X and t.
   Mat<3> strain_of(const json& changes, const Vec<3>& X = Vec<3>(0.5, 0.25, 0), double t = 2) {
     json scene = square();
     scene["materials"][0].update(changes);

@@ -53,14 +53,13 @@ inline Setup<2> quarter_rings(const std::vector<Ring>& rings) {
   return setup;
 }
 
-/// Of rings a..b and b..c of one material in plane stress that overlap by so much of the radius [Pa].
+/// The pressure between rings a..b and b..c of one material in plane stress that overlap by so much of the radius [Pa].
 inline double press_fit_pressure(double a, double b, double c, double E, double nu, double overlap) {
   const double outer = (c * c + b * b) / (c * c - b * b) + nu, inner = (b * b + a * a) / (b * b - a * a) - nu;
   return overlap * E / (b * (outer + inner));
 }
 
-/// Of a body between the radii a and c under the pressure p on a: the radial stress -p a^2 (c^2/r^2 - 1) / (c^2 - a^2) of
-/// cells near a, extrapolated to a by the least squares fit of A + B / r^2.
+/// The radial stress of a body at a radius, by the least squares fit of A + B / r^2 to its cells.
 inline double mean_radial_stress(const Simulation<2>& simulation, int body, double at) {
   const auto& mesh = simulation.mesh();
   const std::vector<double> stress = cell_stress(simulation).cauchy;

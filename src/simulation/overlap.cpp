@@ -225,7 +225,7 @@ class OverlapResolver {
            "an overlap of bodies that are not held there, on cells that are larger than the overlap");
   }
 
-  /// Of a cell [N/m].
+  /// The stiffness of a cell [N/m].
   double unit_stiffness() const {
     double modulus = 0;
     for (const auto& [body, material] : setup_.materials) modulus = std::max(modulus, material.youngs_modulus);

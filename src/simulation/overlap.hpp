@@ -6,7 +6,7 @@
 
 namespace itr {
 
-/// Of the depths by which pairs of solids overlap at rest the least; infinite where none do [m].
+/// The least depth by which two solids overlap at rest; infinite where none do [m].
 template <int Dim>
 double least_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 

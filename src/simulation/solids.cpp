@@ -157,7 +157,7 @@ double Solids<Dim>::find_side(std::size_t i, std::size_t j) const {
   return inside > outside ? -1 : 1;
 }
 
-/// Of several facets that are equally near, the one whose plane is farthest from p tells the side.
+/// Where several facets are equally near, the one whose plane is farthest from p tells the side.
 template <int Dim>
 Nearest<Dim> Solids<Dim>::find_nearest(std::size_t j, const Vec<Dim>& p) const {
   constexpr double kEqual = 1e-9;

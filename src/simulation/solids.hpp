@@ -65,11 +65,11 @@ class Solids {
  public:
   /// `y`: positions of the contact surface [m].
   Solids(std::vector<Solid<Dim>> solids, ConstVectorView y);
-  /// The same solids elsewhere.
+  /// Makes the solids of `first` elsewhere.
   Solids(const Solids& first, ConstVectorView y);
 
   const std::vector<Solid<Dim>>& all() const { return solids_; }
-  /// Of bodies in bodies, bodies in obstacles and obstacles in bodies.
+  /// Finds bodies in bodies, bodies in obstacles and obstacles in bodies.
   std::vector<Penetration<Dim>> penetrations() const;
   /// Where closed obstacles are in each other.
   std::optional<Vec<Dim>> find_crossing_obstacles() const;

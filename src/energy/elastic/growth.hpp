@@ -13,7 +13,7 @@ Growth growth_at(const Material& material, const Vec<3>& X);
 /// The law that sees F_e.
 ElasticModuli without_growth(const ElasticModuli& moduli);
 
-// Of moduli with an eigenstrain.
+// Functions of moduli with an eigenstrain.
 
 template <int Dim>
 double grown_density(const Mat<Dim>& G, const ElasticModuli& moduli);
