@@ -2,6 +2,7 @@
 // Materials, and the options of a simulation: plain values.
 #pragma once
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <atomic>
 #include <functional>
@@ -47,7 +48,18 @@ class ITR_EXPORT OwnLaw {
   virtual void stress(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> P) const = 0;
   /// d2W/dF2, Dim^2 x Dim^2, symmetric: F by columns [Pa].
   virtual void hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) const = 0;
+  /// Whether W is a quadratic form of (F + F^T)/2 - I. An eigenstrain is subtracted from that then.
+  virtual bool has_small_strain() const { return false; }
 };
+
+/// Strain of a stress-free body at rest position X [m] and time t [s], symmetric; in 2D its third row is that across the
+/// plane. Empty: none.
+using Eigenstrain = std::function<Mat<3>(const Vec<3>& X, double t)>;
+/// Whether such a strain is symmetric and I + strain positive definite.
+inline bool is_eigenstrain(const Mat<3>& strain) {
+  const Mat<3> F = Mat<3>::Identity() + strain;
+  return F.allFinite() && F == F.transpose() && F(0, 0) > 0 && F(0, 0) * F(1, 1) > F(0, 1) * F(0, 1) && F.determinant() > 0;
+}
 
 /// The material of a body. In 2D all values are per unit thickness.
 struct Material {
@@ -64,9 +76,14 @@ struct Material {
   /// Functions that replace the constants above, sampled at the rest barycentre of each element. Empty: the constant.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};
 
+  Eigenstrain eigenstrain{};        ///< of heat or swelling (docs/theory.md, "Eigenstrain")
+  bool eigenstrain_varies = false;  ///< in space
+  double eigenstrain_time = 0;      ///< t of `eigenstrain` [s]: a step sets it
+
   double lame_mu() const { return lame_mu(youngs_modulus, poisson_ratio); }
   double lame_lambda(int dim) const { return lame_lambda(youngs_modulus, poisson_ratio, dim); }
-  bool has_varying_moduli() const { return youngs_modulus_at || poisson_ratio_at; }
+  /// Whether the law depends on the place.
+  bool has_varying_moduli() const { return youngs_modulus_at || poisson_ratio_at || (eigenstrain && eigenstrain_varies); }
 
   static double lame_mu(double E, double nu) { return E / (2 * (1 + nu)); }
   double lame_lambda(double E, double nu, int dim) const {
@@ -110,6 +127,9 @@ struct AdhesionOptions {
 /// Contact and friction (IPC). docs/theory.md, "Contact", has the exact sums.
 struct ContactOptions {
   bool enabled = false;
+  /// Surfaces that touch or overlap at the start are pushed apart: a run begins at the equilibrium of the interference, at
+  /// rest and without loads (docs/theory.md, "Press fits").
+  bool resolve_overlap = false;
   double dhat = 1e-3;                ///< [m]: the barrier acts below it; 0: as Setup::choose_defaults says
   bool convergent = false;           ///< area weights, duplicate-region correction, 1/dhat^3: kappa is a pressure [Pa]
   double barrier_stiffness = 0;      ///< kappa; 0: as Setup::choose_defaults says

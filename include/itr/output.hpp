@@ -94,7 +94,8 @@ struct RunInfo {
   std::optional<double> start{};  ///< when the run began, by its monotonic clock [s]; empty: only steps are timed
   /// Names that the folder gets too: forces.csv, report.html. Where one is taken, the run is refused before it begins.
   std::vector<std::string> files{};
-  std::string defaults{};  ///< the scene's set of them, with its version; empty: a program sets all
+  std::string defaults{};          ///< the scene's set of them, with its version; empty: a program sets all
+  double interference_energy = 0;  ///< Simulation::interference_energy [J]; told unless it is 0
 };
 
 /// The writer of a run. Every file is complete or absent; steps.jsonl is flushed after each line. Throws InputError if the

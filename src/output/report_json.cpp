@@ -242,6 +242,7 @@ std::string Totals::summary_json(const RunInfo& info, const Units& units, const 
       {"defaults", info.defaults}, {"units", {{"length", units.length()}, {"mass", units.mass()}, {"time", units.time()}}},
       {"steps", total.step},       {"cut_steps", total.cut_steps},
       {"t", to_json(total.t)}};
+  if (info.interference_energy != 0) json["interference_energy"] = to_json(units.from_si(info.interference_energy, "J"));
   add_fields(total, in_summary, json);
   json[kGain] = to_json(units.from_si(gain_, "J"));
   json.update(members);

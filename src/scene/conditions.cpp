@@ -8,6 +8,7 @@
 #include <mutex>
 #include <set>
 
+#include "eigenstrain.hpp"
 #include "function.hpp"
 #include "mesh/facet_tags.hpp"
 #include "polyfem/python_value.hpp"
@@ -26,6 +27,7 @@ class ConditionReader {
         boundary_(root["boundary_conditions"]),
         initial_(root["initial_conditions"]),
         geometry_(root["geometry"]),
+        eigenstrains_(eigenstrain_components(root)),
         setup_(setup),
         warnings_(warnings),
         facet_tags_(facet_tags(setup.mesh)) {
@@ -44,6 +46,7 @@ class ConditionReader {
     read_pressure();
     read_cavities();
     read_motions(geometry);
+    for (const Node& value : eigenstrains_) end_steps_at_kinks(value, value["no such key"]);
     setup_.obstacles = std::move(geometry.obstacles);
     setup_.initial_displacement = read_initial("solution");
     setup_.initial_velocity = read_initial("velocity");
@@ -571,6 +574,7 @@ class ConditionReader {
 
   const Sets& sets_;
   Node boundary_, initial_, geometry_;
+  std::vector<Node> eigenstrains_;
   Setup<Dim>& setup_;
   std::vector<std::string>& warnings_;
   std::set<int> facet_tags_, point_tags_, obstacle_ids_;

@@ -28,6 +28,7 @@ class Expression {
   double operator()(const Variables& variables) const;
   bool is_constant() const { return !uses_space_ && !uses_time_; }
   bool uses_time() const { return uses_time_; }
+  bool uses_space() const { return uses_space_; }
   /// Times between these two at which it, or a derivative up to the second, may jump: where a condition, a sign or a whole
   /// number that depends on t alone changes. Of two changes within a thousandth of the way the first may be missed.
   std::vector<double> kinks(double begin, double end) const;

@@ -152,13 +152,13 @@ ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpol
   Component component = read_component(value);
   if (!scales.empty()) component.scale = Interpolation(scales[0]);
   if (component.is_constant())
-    return {[constant = component.constant](const Vec<Dim>&, double) { return constant; }, component.constant == 0};
+    return {[constant = component.constant](const Vec<Dim>&, double) { return constant; }, component.constant == 0, false};
   return {[component, units = SceneUnits(value)](const Vec<Dim>& X, double t) {
             const double result = component(units.operator()<Dim>(X, t));
             if (!std::isfinite(result)) units.fail<Dim>(X, t);
             return result;
           },
-          false};
+          false, component.python || (component.expression && component.expression->uses_space())};
 }
 
 std::vector<double> find_kinks(const Node& value, const Node& interpolation, double begin, double end) {

@@ -37,6 +37,7 @@ template <int Dim>
 struct ScalarFunction {
   std::function<double(const Vec<Dim>& X, double t)> function;
   bool is_zero = false;  ///< the constant 0
+  bool uses_space = false;
 };
 template <int Dim>
 ScalarFunction<Dim> read_scalar_function(const Node& value, const Node& interpolation);

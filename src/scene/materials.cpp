@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "defaults.hpp"
+#include "eigenstrain.hpp"
 #include "energy/elastic/law_table.hpp"
 #include "function.hpp"
 #include "law_reader.hpp"
@@ -36,6 +37,7 @@ class MaterialReader {
     // An isotropic law is the same in all directions.
     if ((law.law == MaterialLaw::linear || law.law == MaterialLaw::saint_venant_kirchhoff) && has_axes(node))
       read_axes(node, dimension);
+    read_eigenstrain(node, dimension, material_);
     require("rho", read_scalar(node["rho"], 1), is_positive, "a number > 0");
     material_.density = requirements_.back().value.constant;
     material_.density_at = requirements_.back().value.function;

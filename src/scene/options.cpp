@@ -187,6 +187,9 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
                                      contact["dhat"].pointer(), units.text(options.dhat, "m", 6),
                                      units.text(shortest_edge, "m", 6)));
   }
+  options.resolve_overlap = contact["initial_overlap"].choice({"refuse", "resolve"}, 0) == 1;
+  if (options.resolve_overlap && !options.enabled)
+    contact["initial_overlap"].fail("\"resolve\" without contact", "it where /contact/enabled is true");
   options.convergent = contact["use_convergent_formulation"].boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
   const Node epsv = contact["epsv"];

@@ -44,6 +44,18 @@ void for_each_vertex_of_node(const Mesh<Dim>& mesh, int node, const Visit& visit
 }
 
 template <int Dim>
+bool is_of_one_part(const Mesh<Dim>& mesh, const std::array<int, 4>& nodes, int count) {
+  int part = kNone;
+  bool is = true;
+  for (int k = 0; k < count; ++k)
+    for_each_vertex_of_node(mesh, nodes[k], [&](VertexId v) {
+      if (part == kNone) part = mesh.part_of_vertex(v);
+      is = is && mesh.part_of_vertex(v) == part;
+    });
+  return is;
+}
+
+template <int Dim>
 std::vector<char> closed_nodes(const Mesh<Dim>& mesh) {
   std::vector<char> closed(mesh.num_nodes());
   for (std::size_t node = 0; node < closed.size(); ++node) closed[node] = is_closed(mesh, static_cast<int>(node));
@@ -94,6 +106,8 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
     for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
   const std::vector<char> all(mesh.num_nodes(), 1);
   for_each_coincident_pair<Dim>(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
+    // Bodies that coincide are in contact where a start without overlap is found.
+    if (setup.contact.resolve_overlap && !is_of_one_part(mesh, vertices, pair_size(kind))) return;
     for (int k = 0; k < pair_size(kind); ++k)
       for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { mesh.set_steps_apart(v, 0); });
   });

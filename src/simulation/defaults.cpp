@@ -13,6 +13,8 @@
 #include "mesh/rest_box.hpp"
 #include "mesh/turn.hpp"
 #include "simulation/closed_faces.hpp"
+#include "simulation/incoming_state.hpp"
+#include "simulation/overlap.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
@@ -28,10 +30,13 @@ constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, litt
 /// curved edges and remeshing, which resolve contact as far as dhat does, would cost too much.
 constexpr double kDhatByThicknessIfPressed = 2e-4;
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
-constexpr double kLeastDhat = 0.01;     ///< of that without the gap: what nearly touches presses a little at the start
-constexpr double kDhatByMotion = 0.01;  ///< of the way that is prescribed without inertia
-constexpr int kFirstSteps = 20;         ///< that are looked at: choices do not depend on where the run ends
-constexpr double kSlipByMotion = 1e-3;  ///< of the speed that is prescribed: friction is smoothed below that
+constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
+constexpr double kDhatByOverlap = 0.005;  ///< of the overlap that is resolved, as long as that leaves kLeastByOverlap
+constexpr double kLeastByOverlap = 1e-3;
+constexpr double kDhatByMotion = 0.01;    ///< of the way that is prescribed without inertia
+constexpr double kDhatByGrowth = 0.0025;  ///< of what eigenstrains change of a thickness: it gives little interference
+constexpr int kFirstSteps = 20;           ///< that are looked at: choices do not depend on where the run ends
+constexpr double kSlipByMotion = 1e-3;    ///< of the speed that is prescribed: friction is smoothed below that
 /// Part of the speed that gravity gives over the bodies' size: bodies that it holds in place creep by less than 1e-4 of
 /// their size in the time of a hundred falls over it.
 constexpr double kSlipByFall = 5e-7;
@@ -56,11 +61,32 @@ double mean_vertex_area(const Mesh<Dim>& mesh) {
   return area / std::max(1, vertices);
 }
 
+/// The most that a body grows or shrinks by over its thickness in the first steps, of eigenstrains [m].
+template <int Dim>
+double prescribed_growth(const Setup<Dim>& setup) {
+  const std::map<int, BodySize> sizes = body_sizes(setup.mesh);
+  const int steps = setup.time.is_static ? 1 : kFirstSteps;
+  double most = 0;
+  for (const CellId c : setup.mesh.live_cells()) {
+    const int body = setup.mesh.body(c);
+    const Material& material = setup.materials.at(body);
+    if (!material.eigenstrain) continue;
+    Vec<3> X = Vec<3>::Zero();
+    X.head<Dim>() = setup.mesh.barycenter(c);
+    for (int i = 0; i <= steps; ++i) {
+      const Mat<3> strain = material.eigenstrain(X, setup.time.t0 + i * setup.time.dt);
+      most = std::max(most, strain.lpNorm<Eigen::Infinity>() * sizes.at(body).thickness);
+    }
+  }
+  return most;
+}
+
 /// Kinetic energy at the start, and what gravity gives over the size of the scene [J]; 0 where something else feeds it.
 template <int Dim>
 double available_energy(const Setup<Dim>& setup) {
   if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.cavities.empty() || !setup.dirichlet.empty() ||
-      !setup.obstacles.motions.empty())
+      !setup.obstacles.motions.empty() || setup.contact.resolve_overlap ||
+      std::ranges::any_of(setup.materials, [](const auto& entry) { return bool(entry.second.eigenstrain); }))
     return 0;
   const Mesh<Dim>& mesh = setup.mesh;
   auto box = rest_box(mesh);
@@ -105,8 +131,8 @@ std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
       contact.barrier_stiffness / barrier_unit(units, contact), units.text(stiffest, "Pa", 3));
 }
 
-/// The longest relative way that conditions and obstacles prescribe in the first steps, whatever the end of the run [m];
-/// infinity where they move nothing.
+/// The longest relative way that conditions, obstacles and eigenstrains prescribe in the first steps, whatever the end of
+/// the run [m]; infinity where they move nothing.
 template <int Dim>
 double prescribed_motion(const Setup<Dim>& setup) {
   double longest = 0;
@@ -117,6 +143,7 @@ double prescribed_motion(const Setup<Dim>& setup) {
       const double t = setup.time.t0 + setup.time.dt * i;
       longest = std::max(longest, relative_motion<Dim>(held_dofs(setup, setup.mesh, t).target - first));
     }
+    longest = std::max(longest, kDhatByGrowth / kDhatByMotion * prescribed_growth(setup));
   } catch (const InputError&) {  // no value at a time that no step asks for
   }
   return longest > 0 ? longest : std::numeric_limits<double>::infinity();
@@ -168,7 +195,9 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
   const double by_thickness = is_pressed ? kDhatByThicknessIfPressed : kDhatByThickness;
   dhat = std::min({by_thickness * thinnest, kDhatByEdge * shortest, kDhatByMotion * motion});
   double gap = std::numeric_limits<double>::infinity();
-  if (!setup.proxy) {
+  const double overlap = contact.resolve_overlap ? least_overlap(setup, initial_mesh(setup)) : gap;
+  dhat = std::min(dhat, std::max(kDhatByOverlap * overlap, kLeastByOverlap * dhat));
+  if (!setup.proxy && !contact.resolve_overlap) {
     Workspace workspace;
     Mesh<Dim> mesh = setup.mesh;
     close_coincident_faces(setup, mesh);
@@ -178,10 +207,12 @@ std::string choose_dhat(const Setup<Dim>& setup, ContactOptions& contact) {
     if (gap > 0 && gap < dhat) dhat = std::max(kDhatByGap * gap, kLeastDhat * dhat);
   }
   return fmt::format(
-      "d-hat {}: {:g} of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}; /contact/dhat sets another",
+      "d-hat {}: {:g} of the thinnest body ({}), a tenth of the shortest surface edge ({}){}{}{}; /contact/dhat sets "
+      "another",
       units.text(dhat, "m"), by_thickness, units.text(thinnest, "m"), units.text(shortest, "m"),
       std::isfinite(motion) ? ", at most a hundredth of what is prescribed, " + units.text(motion, "m") : "",
-      std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "");
+      std::isfinite(gap) ? ", less than the gap, " + units.text(gap, "m") : "",
+      std::isfinite(overlap) ? fmt::format(", {:g} of the overlap, {}", kDhatByOverlap, units.text(overlap, "m")) : "");
 }
 
 /// How far surfaces that are tied may overlap where they bend [m].

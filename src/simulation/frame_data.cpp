@@ -240,7 +240,7 @@ CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const Quadr
         continue;
       }
       const ElasticModuli moduli = frame.moduli(material, element, point);
-      const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, material));
+      const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, moduli));
       cauchy += point.fraction * here;
       equivalent += point.fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, moduli, F));
     }

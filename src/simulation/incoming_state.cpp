@@ -23,6 +23,9 @@ namespace itr {
 namespace {
 
 constexpr int kDigits = 6;  ///< of places
+constexpr const char* kRemedy =
+    "; \"contact\": {\"initial_overlap\": \"resolve\"} finds the equilibrium of bodies that touch or overlap, such as press "
+    "fits";
 
 /// Where no surfaces cross: what is wholly inside of a body.
 template <int Dim>
@@ -32,7 +35,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
     throw InputError(
         {"", "initial state",
          fmt::format("{} inside of a body, at {} {}", what, point_text<Dim>(p, setup.units, kDigits), setup.units.length()),
-         "surfaces that do not touch"});
+         fmt::format("surfaces that do not touch{}", kRemedy)});
   };
   const VectorX& x = state.history.x[0];
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
@@ -135,8 +138,7 @@ void refuse_intersections(const Setup<Dim>& setup, const State<Dim>& state) {
   }
   if (pairs.size() > kMostNamed) found += "; and more";
   throw InputError({"", "initial state", "surfaces that intersect (in " + setup.units.length() + "): " + found,
-                    "surfaces that do not touch, but for faces of bodies that coincide at rest; parts that are pressed into "
-                    "each other begin apart, and a prescribed motion brings them together"});
+                    fmt::format("surfaces that do not touch, but for faces of bodies that coincide at rest{}", kRemedy)});
 }
 
 template <int Dim>

@@ -16,6 +16,7 @@
 #include "linear/choice.hpp"
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/frame_data.hpp"
+#include "simulation/overlap.hpp"
 #include "simulation/step.hpp"
 #include "simulation/step_problem.hpp"
 #include "unsupported.hpp"
@@ -60,6 +61,7 @@ struct Simulation<Dim>::Impl {
   std::function<void(const MeshChange<Dim>&, const Mesh<Dim>&)> on_mesh_change;
   Watch<Dim> watch;
   std::optional<FlatObstacles<Dim>> flats;
+  double interference_energy = 0;  ///< [J]
 
   StepTools<Dim> tools() const { return {setup, initial_edges, *cache, *solver, logger, error_estimator.get()}; }
 
@@ -285,6 +287,15 @@ Simulation<Dim>::Simulation(Setup<Dim> setup, linear::Registry& registry, Logger
   impl_->first_newton = impl_->setup.newton;
   auto state = std::make_shared<State<Dim>>(initial_state(impl_->setup));
   impl_->initial_edges = edge_lengths(state->mesh);
+  if (impl_->setup.contact.resolve_overlap) {
+    // A solver of its own: steps find theirs as they would without an overlap.
+    const auto direct =
+        linear::choose_solver(linear, impl_->setup.newton.indefinite == IndefiniteHessian::accept, registry, Logger());
+    linear::ReusingSolver solver(*direct);
+    ProblemCache<Dim> cache(solver);
+    impl_->interference_energy =
+        resolve_overlap<Dim>({impl_->setup, impl_->initial_edges, cache, solver, impl_->logger}, *state);
+  }
   refuse_intersections(impl_->setup, *state);
   refuse_open_ties(impl_->setup, *state);
   if (impl_->setup.consistent_initial_acceleration && !state->history.a.empty())
@@ -467,6 +478,11 @@ void Simulation<Dim>::observe(const Snapshot<Dim>& snapshot,
 template <int Dim>
 const Setup<Dim>& Simulation<Dim>::setup() const {
   return impl_->setup;
+}
+
+template <int Dim>
+double Simulation<Dim>::interference_energy() const {
+  return impl_->interference_energy;
 }
 
 template <int Dim>

@@ -25,8 +25,7 @@ constexpr double kNegligible = 0.02;  ///< of the largest part of the way that s
 
 /// Whether the body of a cell may buckle, as far as its stress tells.
 template <int Dim>
-bool is_compressed(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
-  const Material& material = setup.materials.at(mesh.body(c));
+bool is_compressed(const Material& material, const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
   const auto element = element_of(mesh, c);
   const Mat<Dim> F = deformation_gradient<Dim>(element, x);
   const Mat<Dim> stress = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, mesh.rest(mesh.cell(c)[0]))) * F.transpose();
@@ -102,8 +101,11 @@ std::set<int> slender_bodies(const Mesh<Dim>& mesh) {
 template <int Dim>
 bool may_buckle(const StepSetup<Dim>& setup, const State<Dim>& state, const VectorX& x) {
   const std::set<int> slender = slender_bodies(state.mesh);
-  for (CellId c = 0; !slender.empty() && c < state.mesh.cell_slots(); ++c)
-    if (slender.contains(state.mesh.body(c)) && is_compressed(setup, state.mesh, c, x)) return true;
+  const std::map<int, Material> materials = materials_at(setup, state.t);
+  for (CellId c = 0; !slender.empty() && c < state.mesh.cell_slots(); ++c) {
+    const int body = state.mesh.body(c);
+    if (slender.contains(body) && is_compressed(materials.at(body), state.mesh, c, x)) return true;
+  }
   return false;
 }
 

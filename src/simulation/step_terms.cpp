@@ -132,8 +132,10 @@ double rest_diagonal(const Mesh<Dim>& mesh) {
 template <int Dim>
 std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t) {
   std::map<int, Material> materials = setup.materials;
-  for (auto& [body, material] : materials)
+  for (auto& [body, material] : materials) {
     if (material.own_at) material.own = material.own_at(t);
+    material.eigenstrain_time = t;
+  }
   return materials;
 }
 

@@ -32,6 +32,12 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
+    {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},
+    {{"/contact/initial_overlap", "\"resolve\" with adhesion, which pulls on what is at rest"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.contact.has_adhesion(); }},
+    {{"/contact/initial_overlap", "\"resolve\" with displacements at the start, /initial_conditions/solution"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && !setup.initial_displacement.empty(); }},
     {{"/contact/friction_pairs", "friction by pair where a collision mesh touches"},
      [](const Setup<Dim>& setup, bool) { return !setup.contact.friction_pairs.empty() && setup.proxy; }},
     {{"/output/error_bars", "error bars where the pressure of a cavity follows its volume"},

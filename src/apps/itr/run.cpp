@@ -267,7 +267,8 @@ class Run {
                                scene.identity,
                                start,
                                further_files(simulation_.setup(), options),
-                               scene.defaults.name};
+                               scene.defaults.name,
+                               simulation_.interference_energy()};
     const auto saved = find_resumable(folder, options);
     std::signal(SIGINT, on_interrupt);  // from here on files are written
     std::signal(SIGTERM, on_termination);

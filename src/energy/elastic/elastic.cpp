@@ -281,7 +281,7 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const double weight = scale_ * element.volume;
     const PatchedLaw law = pressures.in_straight(moduli(e), e);
     const ElasticModuli& here = law;
-    if (here.law == MaterialLaw::neo_hookean) {
+    if (here.is_neo_hookean()) {
       exact_block<Dim>(at, gradients, here.lame, weight, block);
       if (psd != PsdProjection::none)
         project_modes<Dim>(neo_hookean_negative_modes<Dim>(at.F(), here.lame), gradients, weight, psd, block);

@@ -250,7 +250,9 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
 
 template <int Dim>
 double stiffness_at_rest(const ElasticModuli& moduli) {
-  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), moduli).values;
+  ElasticModuli law = moduli;
+  law.growth = {};
+  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), law).values;
   return *std::max_element(values.begin(), values.end());
 }
 

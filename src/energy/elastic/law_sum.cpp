@@ -148,13 +148,14 @@ StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J, const Ce
 }
 
 template <int Dim>
-double thickness(const Mat<Dim>& F, const Material& material) {
-  const LawSum* sum = sum_of(material);
+double thickness(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  const LawSum* sum = sum_of(moduli);
   if (!sum || !sum->is_plane_stress) return 1;
-  const Strain<Dim> strain(Mat<Dim>(F - Mat<Dim>::Identity()));
+  const Mat<Dim> elastic = F * moduli.growth.inverse.template topLeftCorner<Dim, Dim>();
+  const Strain<Dim> strain(Mat<Dim>(elastic - Mat<Dim>::Identity()));
   Vec<3> strains = Principal<Dim>(strain).strains;
   respond_in_plane_stress(*sum, strains, strain.log_J);
-  return std::exp(strains[2]);
+  return std::exp(strains[2]) * (1 + moduli.growth.strain(2, 2));
 }
 
 template <int Dim>
@@ -231,7 +232,7 @@ void LawSum::hessian(const Eigen::Ref<const MatrixX>& F, Eigen::Ref<MatrixX> H) 
   template double sum_density<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&);               \
   template Mat<Dim> sum_stress<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&);              \
   template EigenSystem<Dim> sum_eigensystem<Dim>(const Mat<Dim>&, const LawSum&, const Vec<3>&, const CellVolume&); \
-  template double thickness<Dim>(const Mat<Dim>&, const Material&);
+  template double thickness<Dim>(const Mat<Dim>&, const ElasticModuli&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

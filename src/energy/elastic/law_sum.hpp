@@ -27,12 +27,12 @@ StretchSum response_to(const LawSum& sum, Vec<3> strains, double log_J, const Ce
 /// The terms of a split law that stand for its volumetric part in a cell, by ln J.
 VolumeResponse volume_in_cell(const CellVolume& volume, double log_J);
 
-/// F33 of a sum in plane stress; 1 of other laws and in 3D.
-template <int Dim>
-double thickness(const Mat<Dim>& F, const Material& material);
-
 /// The sum that a law is; null if it is another one.
 inline const LawSum* sum_of(const ElasticModuli& moduli) { return dynamic_cast<const LawSum*>(moduli.own); }
+
+/// F33 of a sum in plane stress; 1 of other laws and in 3D.
+template <int Dim>
+double thickness(const Mat<Dim>& F, const ElasticModuli& moduli);
 
 /// Decomposes a symmetric d2W/dF2, whose rows and columns are F by columns.
 template <int Dim>

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "core/check.hpp"
+#include "growth.hpp"
 #include "isotropic.hpp"
 #include "itr/core.hpp"
 #include "law_sum.hpp"
@@ -98,11 +99,13 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
   if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0, kInfinity);
   if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1, 0.5);
-  return {material.law,
-          {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
-          material.mooney_rivlin,
-          material.own.get(),
-          in_space<Dim>(X)};
+  ElasticModuli moduli{material.law,
+                       {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
+                       material.mooney_rivlin,
+                       material.own.get(),
+                       in_space<Dim>(X)};
+  if (material.eigenstrain) moduli.growth = growth_at<Dim>(material, moduli.X);
+  return moduli;
 }
 
 VolumeResponse volume_in_cell(const CellVolume& volume, double log_J) {
@@ -130,6 +133,11 @@ ElasticModuli without_volume(ElasticModuli whole) {
 
 template <int Dim>
 VolumeResponse volume_energy(const ElasticModuli& whole, double change) {
+  if (whole.growth) {
+    const double g = whole.growth.volume;
+    const VolumeResponse U = volume_energy<Dim>(without_growth(whole), (change - (g - 1)) / g);
+    return {g * U.value, U.first, U.second / g};
+  }
   const double log_J = std::log1p(change), J = 1 + change;
   const VolumeResponse all = volume_part<Dim>(whole, log_J);
   const VolumeResponse kept = square_bulk(without_volume<Dim>(whole).volume.bulk, log_J);
@@ -144,6 +152,7 @@ double mass_density(const Material& material, const Vec<Dim>& X) {
 
 template <int Dim>
 double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+  if (moduli.growth) return grown_density<Dim>(at.G, moduli);
   if (moduli.law == MaterialLaw::neo_hookean) return NeoHookeanPoint<Dim>(at, moduli.lame).density();
   const Mat<Dim>& G = at.G;
   if (!(G.trace() + sum_of_minors(G) > -1)) return std::numeric_limits<double>::infinity();
@@ -169,6 +178,7 @@ double elastic_density(const DisplacementGradient<Dim>& at, const ElasticModuli&
 
 template <int Dim>
 Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) {
+  if (moduli.growth) return grown_stress<Dim>(at.G, moduli);
   const Mat<Dim>& G = at.G;
   const LameParameters& lame = moduli.lame;
   switch (moduli.law) {
@@ -201,6 +211,7 @@ Mat<Dim> elastic_stress(const DisplacementGradient<Dim>& at, const ElasticModuli
 
 template <int Dim>
 EigenSystem<Dim> elastic_eigensystem(const Mat<Dim>& F, const ElasticModuli& moduli) {
+  if (moduli.growth) return grown_eigensystem<Dim>(F, moduli);
   if (moduli.law == MaterialLaw::neo_hookean) return neo_hookean_eigensystem<Dim>(F, moduli.lame);
   if (moduli.law == MaterialLaw::linear) return linear_eigensystem<Dim>(moduli.lame);
   if (moduli.law == MaterialLaw::own) {

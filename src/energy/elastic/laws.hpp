@@ -24,6 +24,17 @@ struct CellVolume {
   double pressure = 0;  ///< dU/dJ of the patches [Pa]
 };
 
+/// The eigenstrain of a law: F = F_e F_g with F_g = I + strain, and the law sees F_e. Its density times det F_g is that of
+/// the body. Of laws of small strains the strain is subtracted.
+struct Growth {
+  int dimension = 0;  ///< of F_g: 2 where the law is one of the plane; 0: there is none
+  bool is_subtracted = false;
+  double volume = 1;  ///< det F_g; in plane stress with the growth across the plane
+  Mat<3> strain = Mat<3>::Zero(), inverse = Mat<3>::Identity();  ///< F_g - I, F_g^-1
+
+  explicit operator bool() const { return dimension != 0; }
+};
+
 /// A law with its moduli at one place.
 struct ElasticModuli {
   MaterialLaw law = MaterialLaw::neo_hookean;
@@ -32,7 +43,10 @@ struct ElasticModuli {
   const OwnLaw* own = nullptr;  ///< of MaterialLaw::own: the material's
   Vec<3> X = Vec<3>::Zero();    ///< rest position, which directions of fibres depend on
   CellVolume volume{};
+  Growth growth{};
 
+  /// Whether the neo-Hookean closed forms of F hold.
+  bool is_neo_hookean() const { return law == MaterialLaw::neo_hookean && !growth; }
   void set_pressure(double pressure) { lame.pressure = volume.pressure = pressure; }
 };
 

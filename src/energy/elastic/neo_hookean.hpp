@@ -23,7 +23,7 @@ Mat<Dim> neo_hookean_stress(const Mat<Dim>& F, const LameParameters& lame);
 template <int Dim>
 struct EigenSystem {
   std::array<double, Dim * Dim> values;
-  std::array<Mat<Dim>, Dim * Dim> modes;  ///< orthonormal in the Frobenius product
+  std::array<Mat<Dim>, Dim * Dim> modes;  ///< orthonormal in the Frobenius product, but with an eigenstrain
 };
 template <int Dim>
 EigenSystem<Dim> neo_hookean_eigensystem(const Mat<Dim>& F, const LameParameters& lame);

@@ -62,8 +62,7 @@ template <int Dim>
 class ElasticPoint {
  public:
   ElasticPoint(const Mat<Dim>& F, const ElasticModuli& moduli) : ElasticPoint(DisplacementGradient<Dim>::of(F), moduli) {}
-  ElasticPoint(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli)
-      : is_neo_hookean_(moduli.law == MaterialLaw::neo_hookean) {
+  ElasticPoint(const DisplacementGradient<Dim>& at, const ElasticModuli& moduli) : is_neo_hookean_(moduli.is_neo_hookean()) {
     if (is_neo_hookean_) {  // with one inverse and one logarithm
       const NeoHookeanPoint<Dim> point(at, moduli.lame);
       inverse_ = point.inverse();

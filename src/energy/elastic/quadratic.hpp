@@ -222,7 +222,7 @@ class QuadraticElasticity {
     sink.target().add_curved_elements<Dim>(cells_, [&](std::size_t e, NodeSet nodes, Mat<Dim * kNodes>& block) {
       const Nodal<Dim> positions = at_nodes<Dim>(elements_[e].nodes(), x);
       block.setZero();
-      if (cells_.axisymmetric || by_element_[e]->law != MaterialLaw::neo_hookean)
+      if (cells_.axisymmetric || !by_element_[e]->is_neo_hookean())
         add_modes(e, positions, pressures, psd, block);
       else
         add_neo_hookean(e, positions, pressures, psd, nodes, block);

@@ -38,6 +38,7 @@ class TensorLaw final : public OwnLaw {
       for (int l = 0; l < dim_; ++l)
         for (int i = 0; i < dim_; ++i) H(i + dim_ * j, i + dim_ * l) += S(j, l);
   }
+  bool has_small_strain() const override { return is_small_strain_; }
 
  private:
   VectorX strain(const Eigen::Ref<const MatrixX>& F) const {
