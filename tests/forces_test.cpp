@@ -2,13 +2,16 @@
 // Forces, stresses, kinetic energy and momentum that observers ask for, against closed forms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 
 #include "advance.hpp"
+#include "energy/pressure.hpp"
 #include "host_block.hpp"
 #include "itr/core.hpp"
+#include "simulation/contact_pressure.hpp"
 #include "simulation/resultant.hpp"
 
 namespace itr {
@@ -173,6 +176,7 @@ void expect_stress_of_stretch(bool plane_strain) {
   constexpr double stretch = 1.2;
   Setup<Dim> setup = block<Dim>();
   setup.materials[1].plane_strain = plane_strain;
+  setup.fields.pressure = setup.fields.stretches = true;
   setup.initial_displacement.push_back(
       {1, [](const Vec<Dim>& X, double) { return Vec<Dim>((stretch - 1) * X[0] * Vec<Dim>::Unit(0)); }});
   linear::Registry registry;
@@ -186,6 +190,13 @@ void expect_stress_of_stretch(bool plane_strain) {
   ASSERT_EQ(fields.stress.size(), Dim * Dim * fields.von_mises.size());
   for (std::size_t c = 0; c < fields.von_mises.size(); ++c) {
     EXPECT_NEAR(fields.von_mises[c], von_mises, 1e-9 * along);
+    EXPECT_NEAR(fields.pressure.at(c), -(along + across + out) / 3, 1e-9 * along);
+    EXPECT_NEAR(fields.stretches.at(3 * c), stretch, 1e-12);
+    EXPECT_NEAR(fields.stretches.at(3 * c + 1), 1, 1e-12);
+    if (Dim == 3 || plane_strain)
+      EXPECT_NEAR(fields.stretches.at(3 * c + 2), 1, 1e-12);
+    else
+      EXPECT_TRUE(std::isnan(fields.stretches.at(3 * c + 2)));  // of a law that does not know the thickness
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < Dim; ++j)
         EXPECT_NEAR(fields.stress[Dim * Dim * c + Dim * i + j], i != j ? 0 : i == 0 ? along : across, 1e-9 * along);
@@ -195,6 +206,44 @@ void expect_stress_of_stretch(bool plane_strain) {
 TEST(Stress, OfAStretchInPlaneStress) { expect_stress_of_stretch<2>(false); }
 TEST(Stress, OfAStretchInPlaneStrain) { expect_stress_of_stretch<2>(true); }
 TEST(Stress, OfAStretchInSpace) { expect_stress_of_stretch<3>(false); }
+
+/// A body that is pressed by p at its bottom: all vertices there have it, also at the rim, and others nothing.
+template <int Dim>
+void expect_uniform_contact_pressure(bool is_curved, bool is_turned) {
+  constexpr double p = 700;
+  Mesh<Dim> mesh = block<Dim>().mesh;
+  if (is_curved) mesh.set_curved_edges(mesh.edges());
+  if constexpr (Dim == 2) mesh.set_axisymmetric(is_turned);
+  VectorX x(Dim * mesh.num_nodes());
+  for (int v = 0; v < mesh.num_nodes(); ++v) {
+    x.segment<Dim>(Dim * v) = mesh.point_of_node(v);
+    x[Dim * v] *= 1.1;  // the present area counts
+  }
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    const auto& facet = mesh.facet(f);
+    mesh.set_facet_tag(f, std::ranges::all_of(facet, [&](VertexId v) { return mesh.rest(v)[1] < 1e-9; }) ? 7 : 8);
+  }
+  const CellSet<Dim> cells = whole_mesh(mesh, {});
+  Loads<Dim> loads;
+  loads.pressures = {{7, [](const RestPoint<Dim>&) { return p; }}};
+  VectorX force = VectorX::Zero(x.size());
+  Workspace workspace;
+  PressureEnergy<Dim>(cells, loads, x, 1).add_gradient(x, force, workspace);
+  const VectorX found = contact_pressure(mesh, x, VectorX(-force));
+  for (int v = 0; v < mesh.num_nodes(); ++v) {
+    const bool is_inner = v < mesh.num_vertices();
+    const bool is_at_bottom = mesh.point_of_node(v)[1] < 1e-9;
+    if (is_inner || is_at_bottom) EXPECT_NEAR(found[v], is_at_bottom ? p : 0, 1e-9 * p) << v;
+  }
+}
+
+TEST(ContactPressure, IsThatOfUniformPressure) {
+  expect_uniform_contact_pressure<2>(false, false);
+  expect_uniform_contact_pressure<2>(true, false);
+  expect_uniform_contact_pressure<3>(false, false);
+  expect_uniform_contact_pressure<3>(true, false);
+  expect_uniform_contact_pressure<2>(false, true);
+}
 
 TEST(Totals, OfARotatingBlock) {
   auto setup = block<2>();

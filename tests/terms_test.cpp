@@ -52,6 +52,16 @@ TrialScene scene_of_all_terms() {
   scene.context.contact.adhesion = {.strength = 1, .peak = 0.05, .reach = 0.1, .tangential_coefficient = 0.3};
   scene.context.host.push_back(push({1, 0}));
   scene.context.loads.cavities = {{{3}, 0.5, 1, 1.4, 0}};
+  auto viscous = scene.context.materials;
+  for (auto& [body, material] : viscous) material.prony = {{0.5, 0.1}};
+  Mesh<2> start = scene.mesh;
+  start.compact();
+  VectorX x = 1.1 * scene.fields.x;
+  const auto state = begin_viscous<2>(start, viscous, x, 0);
+  scene.context.viscous = std::make_shared<ViscousStep<2>>(
+      std::dynamic_pointer_cast<const ViscousField<2>>(
+          ViscousStep<2>(std::dynamic_pointer_cast<const ViscousField<2>>(state), viscous, 0.1).end(start, x, 0.1).state),
+      viscous, 0.1);
   scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
   const auto dofs = scene.fields.x.size() + 2 * static_cast<Eigen::Index>(scene.context.obstacles.rest.size());
   scene.context.tie = std::make_shared<LinearizedForces<2>>(VectorX(), VectorX::Zero(dofs), 1);
@@ -99,6 +109,7 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
   const TrialScene all = scene_of_all_terms();
   const std::vector<std::pair<TermKind, std::function<void(StepContext<2>&)>>> without = {
       {TermKind::inertia, [](auto& c) { c.has_inertia = false; }},
+      {TermKind::viscous, [](auto& c) { c.viscous = nullptr; }},
       {TermKind::loads, [](auto& c) { c.loads.acceleration = nullptr, c.loads.tractions.clear(); }},
       {TermKind::host, [](auto& c) { c.host.clear(); }},
       {TermKind::follower, [](auto& c) { c.follower = nullptr; }},

@@ -131,8 +131,10 @@ struct ITR_EXPORT StepReport {
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
   /// Energy that the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]:
-  /// not gained by remeshing, though the total is lower by it. Over all parts of a step that was cut.
+  /// not gained by remeshing, though the total is lower by it. Of viscoelastic bodies, too, what their state lost where it
+  /// was averaged over new cells. Over all parts of a step that was cut.
   double history_loss = 0;
+  double viscous_dissipation = 0;  ///< by viscoelastic bodies [J]
   /// By body that edits touched: momentum that they changed, as impulses over the step. The rate of momentum (the
   /// acceleration of the integrator, from the momenta that were reported) times dt is that of the forces plus these. Empty
   /// without inertia.
@@ -214,6 +216,9 @@ struct AskedFields {
   NodalForces forces;
   std::vector<double> von_mises;       ///< a cell [Pa]; in 2D of the plane stress, or strain, that the material says
   std::vector<double> stress;          ///< Cauchy stress, Dim x Dim a cell, row-major [Pa]
+  std::vector<double> pressure;        ///< a cell: minus the mean normal stress [Pa]
+  std::vector<double> stretches;       ///< three a cell: in the plane (3D: all) the largest first, then across it
+  VectorX contact_pressure;            ///< a node of the bodies [Pa]
   std::vector<double> kinetic_energy;  ///< of all bodies, one number [J]
   std::vector<double> momentum;        ///< of all bodies, Dim numbers [kg m/s]
   std::vector<ForceCurvePoint> curves;

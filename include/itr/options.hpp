@@ -61,6 +61,12 @@ inline bool is_eigenstrain(const Mat<3>& strain) {
   return F.allFinite() && F == F.transpose() && F(0, 0) > 0 && F(0, 0) * F(1, 1) > F(0, 1) * F(0, 1) && F.determinant() > 0;
 }
 
+/// A term of the relaxation function of shear moduli, 1 - sum g (1 - exp(-t / tau)).
+struct PronyTerm {
+  double g;    ///< share of the instantaneous moduli
+  double tau;  ///< [s]
+};
+
 /// The material of a body. In 2D all values are per unit thickness.
 struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
@@ -72,6 +78,10 @@ struct Material {
   std::shared_ptr<const OwnLaw> own{};  ///< of MaterialLaw::own; E and nu then are those of small strains, a scale
   std::function<std::shared_ptr<const OwnLaw>(double t)> own_at{};  ///< that at time t [s] instead; empty: `own` always
   VolumeForm volume = VolumeForm::pointwise;
+  std::vector<PronyTerm> prony{};  ///< viscoelasticity of the deviator (docs/theory.md, "Viscoelasticity"); empty: elastic
+  /// Factor of the law's resistance to changes of shape, which leaves its bulk modulus at rest as it is; with terms of
+  /// `prony` the instantaneous law has it.
+  double deviator = 1;
 
   /// Functions that replace the constants above, sampled at the rest barycentre of each element. Empty: the constant.
   SpaceFunction youngs_modulus_at{}, poisson_ratio_at{}, density_at{};

@@ -116,8 +116,9 @@ struct FieldOptions {
   std::vector<ForceTarget> curves{};  ///< summed forces
   std::vector<PointTarget> points{};  ///< displacements
   bool error_bars = false;            ///< estimate errors of energy, curves and points
+  bool pressure = false, stretches = false, contact_pressure = false;
   bool any_forces() const {
-    return contact_forces || friction_forces || reaction_forces || applied_forces || !curves.empty();
+    return contact_forces || contact_pressure || friction_forces || reaction_forces || applied_forces || !curves.empty();
   }
 };
 

@@ -42,6 +42,9 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
   velocity_reference_ = history.velocity_reference;
   renew_term(inertia_, is_in(TermKind::inertia, terms), cells_, terms.materials, terms.mass, history.predictor);
   renew_term(elastic_, is_in(TermKind::elastic, terms), cells_, terms.materials, terms.scaling, terms.quadrature_degree);
+  viscous_ = terms.viscous
+                 ? std::make_shared<ViscousEnergy<Dim>>(cells_, terms.viscous, terms.scaling, terms.quadrature_degree)
+                 : nullptr;
   renew_term(loads_, is_in(TermKind::loads, terms), cells_, terms.materials, terms.loads, terms.scaling);
   cavities_.clear();
   for (const CavityLoad& cavity : terms.loads.cavities)

@@ -14,6 +14,7 @@
 #include "energy/polyfem/adhesion.hpp"
 #include "energy/pressure.hpp"
 #include "energy/terms.hpp"
+#include "energy/viscous.hpp"
 #include "fem/vertex_map.hpp"
 
 namespace itr {
@@ -62,6 +63,7 @@ class IncrementalPotential {
     };
     visit(TermKind::inertia, inertia_);
     visit(TermKind::elastic, elastic_);
+    visit(TermKind::viscous, viscous_);
     visit(TermKind::loads, loads_);
     for (const auto& term : host_) visit(TermKind::host, term);
     visit(TermKind::follower, lagged.follower);
@@ -104,6 +106,7 @@ class IncrementalPotential {
   std::shared_ptr<const VertexMap<Dim>> map_;
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
+  std::shared_ptr<ViscousEnergy<Dim>> viscous_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
   std::vector<std::shared_ptr<const Energy>> cavities_;
   std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed

@@ -20,11 +20,15 @@
 
 namespace itr {
 
+template <int Dim>
+class ViscousStep;
+
 /// Options and loads of all terms of a step; the cells of the sum come from a CellSet.
 template <int Dim>
 struct PotentialTerms {
-  std::map<int, Material> materials;  ///< by body
-  Loads<Dim> loads;                   ///< at the end of the step
+  std::map<int, Material> materials;                  ///< by body; of viscoelastic ones the moduli over the step
+  std::shared_ptr<const ViscousStep<Dim>> viscous{};  ///< what their past adds to it; null: there are none
+  Loads<Dim> loads;                                   ///< at the end of the step
   bool has_inertia = true;
   bool axisymmetric = false;  ///< CellSet::axisymmetric of all cells
   MassKind mass = MassKind::consistent;
@@ -44,6 +48,7 @@ struct PotentialTerms {
 enum class TermKind {
   inertia,
   elastic,
+  viscous,
   loads,
   host,
   follower,
@@ -122,6 +127,11 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
            return std::all_of(terms.materials.begin(), terms.materials.end(),
                               [](const auto& entry) { return itr::is_bounded<Dim>(entry.second); });
          },
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .is_stored = true},
+    {.kind = TermKind::viscous,
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.viscous != nullptr; },
+     .energy = EnergyEntry::elastic,
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .is_stored = true},
     {.kind = TermKind::loads,  // of its forces only tractions are reported: StepProblem::forces

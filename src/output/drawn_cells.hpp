@@ -39,6 +39,15 @@ struct DrawnCells {
   }
 };
 
+/// Numbers by node with those on the straight edges, the means of their ends.
+template <int Dim>
+VectorX numbers_at_nodes(const DrawnCells<Dim>& drawn, ConstVectorView numbers) {
+  VectorX all(numbers.size() + static_cast<Eigen::Index>(drawn.straight_edges.size()));
+  all.head(numbers.size()) = numbers;
+  for (Eigen::Index i = numbers.size(); const auto& [a, b] : drawn.straight_edges) all[i++] = (numbers[a] + numbers[b]) / 2;
+  return all;
+}
+
 template <int Dim>
 DrawnCells<Dim> draw_cells(const Mesh<Dim>& mesh) {
   DrawnCells<Dim> drawn;

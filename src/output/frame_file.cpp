@@ -122,6 +122,8 @@ void write_curves(const Target& target, const FrameView<Dim>& frame, ConstVector
   write_forces("/drawn/contact_force", frame.asked->forces.contact);
   write_forces("/drawn/friction_force", frame.asked->forces.friction);
   write_forces("/drawn/reaction_force", frame.asked->forces.reaction);
+  if (frame.asked->contact_pressure.size() > 0)
+    target.write("/drawn/contact_pressure", as_span(numbers_at_nodes(drawn, frame.asked->contact_pressure)), 0, "Pa");
 }
 
 /// Cells, rows of /mesh/surface and vertices by name.
@@ -167,6 +169,9 @@ void write_asked(const Target& target, const AskedFields& asked) {
   write("/fields/reaction_force", as_span(asked.forces.reaction), Dim, "N");
   write("/fields/von_mises", asked.von_mises, 0, "Pa");
   write("/fields/stress", asked.stress, Dim * Dim, "Pa");
+  write("/fields/contact_pressure", as_span(asked.contact_pressure), 0, "Pa");
+  write("/fields/hydrostatic_pressure", asked.pressure, 0, "Pa");
+  write("/fields/principal_stretches", asked.stretches, 3, "");
   write("/totals/kinetic_energy", asked.kinetic_energy, 0, "J");
   write("/totals/momentum", asked.momentum, 0, "kg m/s");
   if (asked.curves.empty()) return;
@@ -263,9 +268,10 @@ std::vector<std::size_t> shape_of(const FrameView<Dim>& frame) {
     shape.insert(shape.end(), {size(set.cells), size(set.facets), size(set.vertices)});
   if (frame.asked) {
     const AskedFields& asked = *frame.asked;
-    shape.insert(shape.end(), {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),
-                               size(asked.von_mises), size(asked.stress), size(asked.kinetic_energy), size(asked.momentum),
-                               size(asked.curves)});
+    shape.insert(shape.end(),
+                 {size(asked.forces.contact), size(asked.forces.friction), size(asked.forces.reaction),
+                  size(asked.von_mises), size(asked.stress), size(asked.pressure), size(asked.stretches),
+                  size(asked.contact_pressure), size(asked.kinetic_energy), size(asked.momentum), size(asked.curves)});
   }
   return shape;
 }
@@ -333,7 +339,7 @@ FrameSizes read_frame_sizes(const std::filesystem::path& path) {
                    {}};
   for (const char* asked : kAskedFields) {
     const std::string name = asked;
-    const bool is_drawn = sizes.drawn_nodes > 0 && name.ends_with("_force");
+    const bool is_drawn = sizes.drawn_nodes > 0 && (name.ends_with("_force") || name == "contact_pressure");
     if (file.contains((is_drawn ? "/drawn/" : "/fields/") + name)) sizes.asked.push_back(name);
   }
   return sizes;

@@ -49,7 +49,8 @@ constexpr const char* kStepsApart = "/mesh/steps_apart";
 constexpr const char* kAxisymmetric = "/mesh/axisymmetric";  ///< there, and 1, in frames of axisymmetric scenes
 
 /// Datasets of /fields that only a scene which asks for them has.
-constexpr const char* kAskedFields[] = {"contact_force", "friction_force", "reaction_force", "von_mises", "stress"};
+constexpr const char* kAskedFields[] = {"contact_force", "friction_force",   "reaction_force",       "von_mises",
+                                        "stress",        "contact_pressure", "hydrostatic_pressure", "principal_stretches"};
 
 /// Entry of an index for a frame.
 struct FrameSizes {

@@ -92,7 +92,11 @@ std::string tensor_field(const FrameEntry& entry, const std::string& name, const
 std::string asked_field(const FrameEntry& entry, const std::string& group, const std::string& name) {
   const std::string set = "/fields/" + name;
   if (name == "stress") return tensor_field(entry, name, set);
-  if (name != "von_mises") return vector_field(entry, name, group + name);
+  if (name.ends_with("_force")) return vector_field(entry, name, group + name);
+  if (name == "contact_pressure")
+    return attribute(name, "Scalar", "Node", data_item(entry, group + name, std::to_string(entry.vertices), "Float"));
+  if (name == "principal_stretches")
+    return attribute(name, "Vector", "Cell", data_item(entry, set, std::to_string(entry.cells) + " 3", "Float"));
   return attribute(name, "Scalar", "Cell", data_item(entry, set, std::to_string(entry.cells), "Float"));
 }
 

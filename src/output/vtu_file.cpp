@@ -148,6 +148,13 @@ void write_vtu(const std::filesystem::path& directory, const FrameView<Dim>& fra
     forces("contact_force", frame.asked->forces.contact);
     forces("friction_force", frame.asked->forces.friction);
     forces("reaction_force", frame.asked->forces.reaction);
+    if (frame.asked->contact_pressure.size() > 0) {
+      const VectorX all = numbers_at_nodes(drawn, frame.asked->contact_pressure);
+      points += array("contact_pressure", "Float64", pressures({all.begin(), all.end()}), 1);
+    }
+    if (!frame.asked->pressure.empty())
+      cells += array("hydrostatic_pressure", "Float64", pressures(frame.asked->pressure), 1);
+    if (!frame.asked->stretches.empty()) cells += array("principal_stretches", "Float64", frame.asked->stretches, 3);
     if (!frame.asked->von_mises.empty()) cells += array("von_mises", "Float64", pressures(frame.asked->von_mises), 1);
     if (!frame.asked->stress.empty())
       cells += array("stress", "Float64", tensors_in_space(pressures(frame.asked->stress), Dim), 9);

@@ -142,6 +142,9 @@ struct Writer::Impl {
       if (forces.reaction.size()) asked.push_back("reaction_force");
       if (!frame.asked->von_mises.empty()) asked.push_back("von_mises");
       if (!frame.asked->stress.empty()) asked.push_back("stress");
+      if (frame.asked->contact_pressure.size()) asked.push_back("contact_pressure");
+      if (!frame.asked->pressure.empty()) asked.push_back("hydrostatic_pressure");
+      if (!frame.asked->stretches.empty()) asked.push_back("principal_stretches");
     }
     const int nodes = static_cast<int>(frame.x.size()) / Dim;
     if (vtu_series) vtu_series->add(vtu_series_entry(step, options.units.from_si(t, "s")));

@@ -41,6 +41,7 @@ class MaterialReader {
     require("rho", read_scalar(node["rho"], 1), is_positive, "a number > 0");
     material_.density = requirements_.back().value.constant;
     material_.density_at = requirements_.back().value.function;
+    if (node.has("prony")) read_prony(node["prony"]);
   }
 
   /// At the barycenters of the elements that have the material.
@@ -89,6 +90,27 @@ class MaterialReader {
       volume.fail("\"patches\" for a law without a part U(det F), with moduli that vary, or in plane stress",
                   "\"pointwise\" there");
     return form;
+  }
+
+  void read_prony(const Node& prony) {
+    if (const std::string why = why_not_viscous(material_, dimension_); !why.empty())
+      prony.fail("viscoelasticity of " + why, "a law and a plane that have a deviator in space");
+    const auto read = [&](const char* key) {
+      std::vector<double> numbers;
+      for (const Node& item : prony[key].items()) numbers.push_back(item.positive(1));
+      if (numbers.empty()) prony[key].fail("a list of numbers > 0");
+      return numbers;
+    };
+    const std::vector<double> shares = read("g"), times = read("tau");
+    if (times.size() != shares.size())
+      prony["tau"].fail("a list of length " + std::to_string(times.size()), "that of g: " + std::to_string(shares.size()));
+    double sum = 0;
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      material_.prony.push_back({shares[i], times[i]});
+      sum += shares[i];
+    }
+    if (!(sum < 1)) prony["g"].fail("shares of a sum below 1, by which the moduli relax");
+    if (prony["long_term"].boolean(false)) material_.deviator = 1 / (1 - sum);
   }
 
   ScalarValue read_required(const char* key) const {

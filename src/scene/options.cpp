@@ -414,7 +414,10 @@ FieldOptions read_fields(const Node& root) {
           .von_mises = is_asked("scalar_values"),
           .stress = is_asked("tensor_values"),
           .kinetic_energy = is_asked("kinetic_energy"),
-          .momentum = is_asked("momentum")};
+          .momentum = is_asked("momentum"),
+          .pressure = is_asked("hydrostatic_pressure"),
+          .stretches = is_asked("principal_stretches"),
+          .contact_pressure = is_asked("contact_pressure")};
 }
 
 bool read_lump_mass(const Node& root) { return root["solver"]["advanced"]["lump_mass_matrix"].boolean(false); }

@@ -2,6 +2,7 @@
 #include "simulation/frame_data.hpp"
 
 // Data of a frame: energy densities and stresses by cell, sums of forces, energy and momentum.
+#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -15,7 +16,9 @@
 #include "energy/elastic/patched_volume.hpp"
 #include "energy/elastic/turned.hpp"
 #include "energy/inertia.hpp"
+#include "energy/viscous.hpp"
 #include "fem/locator.hpp"
+#include "simulation/contact_pressure.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/step_terms.hpp"
@@ -96,9 +99,12 @@ struct FrameCells {
   CellSet<Dim> cells;
   PatchPressures<Dim> pressures;
   std::vector<double> densities;
+  std::shared_ptr<const ViscousField<Dim>> viscous;  ///< null: no body is viscoelastic
 
   FrameCells(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x)
-      : materials(materials_at(setup, state.t)), cells(whole_mesh(state.mesh, {})) {
+      : materials(materials_at(setup, state.t)),
+        cells(whole_mesh(state.mesh, {})),
+        viscous(std::dynamic_pointer_cast<const ViscousField<Dim>>(state.history.viscous)) {
     add_patches(materials, cells);
     if (!cells.patches) return;
     const auto rule_of = [&](std::size_t e) -> const auto& {
@@ -116,6 +122,13 @@ struct FrameCells {
   ElasticModuli moduli(const Material& material, const typename CellSet<Dim>::Element& element,
                        const CellPoint<Dim>& point) const {
     return pressures.in(cell_moduli<Dim>(cells, material, point.X), number(element), point.weights);
+  }
+  /// What the past adds to the stress in space and to the energy density at a point of an element.
+  std::pair<Mat<3>, double> past(const Material& material, const typename CellSet<Dim>::Element& element,
+                                 const CellPoint<Dim>& point) const {
+    if (!viscous || material.prony.empty()) return {Mat<3>::Zero(), 0};
+    return past_of_state<Dim>(viscous->by_cell()[static_cast<std::size_t>(element.cell)], point.weights, material,
+                              in_space(point).first);
   }
   /// Mean energy density of the patches in an element.
   double density(const typename CellSet<Dim>::Element& element) const {
@@ -210,6 +223,14 @@ double von_mises(const Mat<Dim>& cauchy, double out_of_plane) {
   return std::sqrt(1.5) * deviator.norm();
 }
 
+/// Principal stretches in the plane (3D: all), the largest first, then that across it.
+template <int Dim>
+Vec<3> stretches_of(const Mat<Dim>& F, double across) {
+  Vec<3> stretches = Vec<3>::Constant(across);
+  stretches.head<Dim>() = Eigen::JacobiSVD<Mat<Dim>>(F).singularValues();
+  return stretches;
+}
+
 Mat<3> stress_in_space(const Material& material, const Mat<3>& F, const Vec<3>& X) {
   return elastic_stress<3>(F, elastic_moduli<3>(material, X)) * F.transpose() / F.determinant();
 }
@@ -222,6 +243,14 @@ double out_of_plane_stress(const Material& material, const ElasticModuli& moduli
   return elastic_stress<3>(in_space, moduli)(2, 2) / F.determinant();
 }
 
+/// F33: not a number for laws of two dimensions, which do not know the thickness.
+template <int Dim>
+double stretch_across(const Material& material, const ElasticModuli& moduli, const Mat<Dim>& F) {
+  const LawSum* sum = sum_of(material);
+  const bool is_known = sum ? sum->dimension == 3 : material.plane_strain;
+  return is_known ? thickness<Dim>(F, moduli) : std::numeric_limits<double>::quiet_NaN();
+}
+
 template <int Dim>
 CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const QuadratureLevels& levels,
                      const Setup<Dim>& setup) {
@@ -229,22 +258,32 @@ CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const Quadr
   for_each_cell_in_order<Dim>(frame.cells, x, levels, setup.quadrature_degree, [&](const auto& element, auto points) {
     const Material& material = frame.materials.at(element.body);
     Mat<Dim> cauchy = Mat<Dim>::Zero();
-    double equivalent = 0;
+    double equivalent = 0, pressure = 0;
+    Vec<3> stretches = Vec<3>::Zero();
     for (const CellPoint<Dim>& point : points) {
       const Mat<Dim>& F = point.F;
       if (point.hoop != 0) {
         const auto [F3, X3] = in_space(point);
-        const Mat<3> here = stress_in_space(material, F3, X3);
+        const Mat<3> here = stress_in_space(material, F3, X3) + frame.past(material, element, point).first;
         cauchy += point.fraction * here.template topLeftCorner<Dim, Dim>();
         equivalent += point.fraction * von_mises<3>(here, 0);
+        pressure -= point.fraction * here.trace() / 3;
+        stretches += point.fraction * stretches_of<Dim>(F, point.hoop);
         continue;
       }
       const ElasticModuli moduli = frame.moduli(material, element, point);
-      const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, moduli));
+      const Mat<3> past = frame.past(material, element, point).first;
+      const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, moduli)) +
+                            past.template topLeftCorner<Dim, Dim>();
       cauchy += point.fraction * here;
-      equivalent += point.fraction * von_mises<Dim>(here, out_of_plane_stress<Dim>(material, moduli, F));
+      const double across = Dim == 3 ? 0 : out_of_plane_stress<Dim>(material, moduli, F) + past(2, 2);
+      equivalent += point.fraction * von_mises<Dim>(here, across);
+      pressure -= point.fraction * (here.trace() + across) / 3;
+      stretches += point.fraction * stretches_of<Dim>(F, stretch_across<Dim>(material, moduli, F));
     }
     stress.von_mises.push_back(equivalent);
+    stress.pressure.push_back(pressure);
+    stress.stretches.insert(stress.stretches.end(), stretches.begin(), stretches.end());
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < Dim; ++j) stress.cauchy.push_back(cauchy(i, j));
   });
@@ -265,10 +304,13 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
   for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
   add_cavities(setup, frame.cells, state, asked.curves);
   asked.points = points_of(setup, state, errors);
-  if (options.von_mises || options.stress) {
+  if (options.contact_pressure) asked.contact_pressure = contact_pressure(state.mesh, data.x, all.contact);
+  if (options.von_mises || options.stress || options.pressure || options.stretches) {
     CellStress stress = stress_of<Dim>(frame, data.x, state.quadrature, setup);
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
     if (options.stress) asked.stress = std::move(stress.cauchy);
+    if (options.pressure) asked.pressure = std::move(stress.pressure);
+    if (options.stretches) asked.stretches = std::move(stress.stretches);
   }
   if (!options.kinetic_energy && !options.momentum) return;
   VectorX product = VectorX::Zero(data.v.size());
@@ -306,6 +348,7 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
     const Material& material = frame.materials.at(element.body);
     double mean = frame.density(element);
     for (const CellPoint<Dim>& point : points) {
+      mean += point.fraction * frame.past(material, element, point).second;
       if (point.hoop != 0) {
         const auto [F3, X3] = in_space(point);
         mean += point.fraction * elastic_density<3>(F3, elastic_moduli<3>(material, X3));

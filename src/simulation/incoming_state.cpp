@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "energy/tie.hpp"
+#include "energy/viscous.hpp"
 #include "itr/core.hpp"
 #include "mesh/validate.hpp"
 #include "simulation/chord_bound.hpp"
@@ -112,6 +113,20 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
                    fmt::format("0 to {}", FlatObstacles<Dim>::kMostDoublings));
 }
 
+/// Refuses a state whose cells relax by other numbers of terms than their materials.
+template <int Dim>
+void check_viscous(const Setup<Dim>& setup, const State<Dim>& state) {
+  using Field = ViscousField<Dim>;
+  const auto field = std::dynamic_pointer_cast<const Field>(state.history.viscous);
+  for (CellId c = 0; c < state.mesh.cell_slots(); ++c) {
+    const auto terms = static_cast<Eigen::Index>(setup.materials.at(state.mesh.body(c)).prony.size());
+    const Eigen::Index rows = terms == 0 ? 0 : Field::kOfLaw + Field::kOfTerm * terms;
+    const Eigen::Index found = field ? field->by_cell().at(static_cast<std::size_t>(c)).rows() : 0;
+    if (found != rows)
+      refuse_state("saved terms of viscoelasticity", std::to_string(found) + " numbers in a cell", std::to_string(rows));
+  }
+}
+
 }  // namespace
 
 template <int Dim>
@@ -187,6 +202,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   open_faces(setup, state.chords, state.history.x[0], state.mesh);
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
+  state.history.viscous = begin_viscous<Dim>(state.mesh, setup.materials, state.history.x[0], state.t);
   return state;
 }
 
@@ -202,6 +218,7 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
     require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved().size());
   if (!state.chords.empty())
     require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(mesh.num_curved()));
+  check_viscous(setup, state);
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
   for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
                                     std::pair("barrier stiffness", state.stiffness.value)})

@@ -87,6 +87,7 @@ inline constexpr std::tuple kStepFields{
     ReportField{"min_distance", &StepReport::min_distance, AddUp::least, "m", everywhere},
     ReportField{"min_volume_ratio", &StepReport::min_volume_ratio, AddUp::least, "", everywhere},
     ReportField{"history_loss", &StepReport::history_loss, AddUp::sum, "J", everywhere},
+    ReportField{"viscous_dissipation", &StepReport::viscous_dissipation, AddUp::sum, "J", everywhere | if_any},
     ReportField{"indefinite", &StepReport::indefinite, AddUp::sum, "", in_files},
     ReportField{"damped_steps", &StepReport::damped_steps, AddUp::sum, "", in_files},
     ReportField{"refined_quadrature", &StepReport::refined_quadrature, AddUp::last, "", in_files},

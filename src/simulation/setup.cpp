@@ -158,6 +158,14 @@ void check_materials(const Setup<Dim>& setup) {
     require_positive(place + "/E", material.youngs_modulus);
     require(nu > -1 && nu < 0.5, place + "/nu", nu, "a number of (-1, 0.5)");
     require_positive(place + "/rho", material.density);
+    require_positive(place + "/deviator", material.deviator);
+    double relaxed = 0;
+    for (const PronyTerm& term : material.prony) {
+      require_positive(place + "/prony/g", term.g);
+      require_positive(place + "/prony/tau", term.tau);
+      relaxed += term.g;
+    }
+    require(relaxed < 1, place + "/prony/g", relaxed, "shares of a sum below 1");
   }
 }
 

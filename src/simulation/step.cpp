@@ -23,6 +23,7 @@
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/stability.hpp"
+#include "simulation/step_terms.hpp"
 
 namespace itr {
 
@@ -186,6 +187,7 @@ class StepSolver {
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
+    if (next_.history.viscous) end_viscous(start);
     if (setup_.contact.enabled) tell_of_closed_faces();
     if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
@@ -332,6 +334,17 @@ class StepSolver {
     } else {
       next_.chords.clear();
     }
+  }
+
+  /// Lets viscoelastic bodies relax over the step; `start`, unless null, gets the state before it on its mesh.
+  void end_viscous(State<Dim>* start) {
+    if (start && !renumbering_.empty())
+      start->history.viscous =
+          viscous_step(setup_, next_.history, before_.t)->end(next_.mesh, next_.history.x[0], before_.t).state;
+    auto end = viscous_step(setup_, next_.history, next_.t)->end(next_.mesh, x_, next_.t);
+    next_.history.viscous = std::move(end.state);
+    report_.viscous_dissipation = end.dissipation;
+    report_.history_loss += end.loss;
   }
 
   /// Warns where faces that are no contact begin to be pressed into each other.

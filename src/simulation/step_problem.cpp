@@ -216,6 +216,7 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
   potential_.for_each(shown, [&](TermKind kind, const auto& term) {
     entry_of(report, traits<Dim>(kind).energy) += term->value(x, workspace_) / terms_.scaling;
   });
+  if (terms_.viscous) report.elastic += terms_.viscous->stored_excess(cells_, x);
   for (std::size_t i = 0; i < kNumEnergyEntries; ++i) report.total += entry_of(report, static_cast<EnergyEntry>(i));
   return report;
 }
@@ -239,7 +240,7 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   EnergySum contact, friction, applied;
   add(ForceEntry::contact, contact);
   add(ForceEntry::friction, friction);
-  if (asked.contact_forces || all) get(contact, forces.contact, &forces.obstacle_contact);
+  if (asked.contact_forces || asked.contact_pressure || all) get(contact, forces.contact, &forces.obstacle_contact);
   if (asked.friction_forces || all) get(friction, forces.friction, &forces.obstacle_friction);
   if (asked.applied_forces || all) {
     const Loads<Dim> tractions{{}, terms_.loads.tractions, {}};

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
+#include <utility>
 
+#include "energy/viscous.hpp"
 #include "itr/core.hpp"
 #include "mesh/rest_box.hpp"
 
@@ -140,11 +143,24 @@ std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t) {
 }
 
 template <int Dim>
+std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup, const History& history, double t) {
+  const auto start = std::dynamic_pointer_cast<const ViscousField<Dim>>(history.viscous);
+  if (!start) return nullptr;
+  const double dt = setup.time.is_static ? std::numeric_limits<double>::infinity() : t - start->time();
+  return std::make_shared<ViscousStep<Dim>>(start, setup.materials, dt);
+}
+
+template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t, bool is_axisymmetric) {
   const TimeIntegrator integrator(setup.time);
+  std::map<int, Material> materials = materials_at(setup, t);
+  const auto viscous = viscous_step<Dim>(setup, history, t);
+  for (auto& [body, material] : materials)
+    if (viscous && viscous->acts_on(body)) material.deviator *= viscous->factor(body);
   std::vector<TermFactory<Dim>> host = setup.terms;
   host.insert(host.end(), setup.nodal_loads.begin(), setup.nodal_loads.end());
-  return {.materials = materials_at(setup, t),
+  return {.materials = std::move(materials),
+          .viscous = viscous,
           .loads = loads_at(setup, t),
           .has_inertia = setup.time.has_inertia(),
           .axisymmetric = is_axisymmetric,
@@ -159,15 +175,16 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .follower = {}};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                       \
-  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                                \
-  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                               \
-  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool);          \
-  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                                     \
-  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                                  \
-  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                          \
-  template std::vector<Mortar<Dim>> mortars_of<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const CellSet<Dim>&); \
-  template double relative_motion<Dim>(const VectorX&);                                                            \
+#define ITR_INSTANTIATE(Dim)                                                                                         \
+  template Loads<Dim> loads_at<Dim>(const StepSetup<Dim>&, double);                                                  \
+  template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                                 \
+  template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool);            \
+  template std::shared_ptr<const ViscousStep<Dim>> viscous_step<Dim>(const StepSetup<Dim>&, const History&, double); \
+  template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                                       \
+  template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                                    \
+  template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                            \
+  template std::vector<Mortar<Dim>> mortars_of<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, const CellSet<Dim>&);   \
+  template double relative_motion<Dim>(const VectorX&);                                                              \
   template double rest_diagonal<Dim>(const Mesh<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

@@ -7,6 +7,7 @@
 
 #include "energy/mortar.hpp"
 #include "energy/terms.hpp"
+#include "energy/viscous.hpp"
 #include "fem/held_rule.hpp"
 #include "itr/setup.hpp"
 #include "time/integrator.hpp"
@@ -20,6 +21,11 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 /// Materials of a setup at time t.
 template <int Dim>
 std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t);
+
+/// What the past of viscoelastic bodies adds to the step that ends at time t; null where there are none. In statics all that
+/// relaxes has done so.
+template <int Dim>
+std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup, const History& history, double t);
 
 /// Terms that act in the step that ends at time t, as every scope of it sees them.
 template <int Dim>

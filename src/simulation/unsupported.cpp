@@ -90,6 +90,12 @@ constexpr Check<Dim> kChecks[] = {
                 return sum && (sum->is_plane_stress || sum->dimension == 2);
               });
      }},
+    {{"/materials/*/prony", "viscoelasticity in plane stress, or of a law of which no part is known to be the deviator's"},
+     [](const Setup<Dim>& setup, bool) {
+       return std::ranges::any_of(setup.materials, [&](const auto& e) {
+         return !e.second.prony.empty() && !why_not_viscous(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim).empty();
+       });
+     }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && std::any_of(setup.materials.begin(), setup.materials.end(),

@@ -3,8 +3,10 @@
 // from new positions (docs/theory.md, "Time").
 #pragma once
 
+#include <memory>
 #include <vector>
 
+#include "core/viscous_history.hpp"
 #include "itr/options.hpp"
 #include "itr/types.hpp"
 
@@ -18,6 +20,7 @@ struct History {
   double dt = 0;           ///< of the step that led to x[0] [s]; 0: as long as the next one
   /// Newmark only: the next step is one of implicit Euler, which dissipates (see TimeOptions::energy_growth_limit).
   bool damp_next = false;
+  std::shared_ptr<const ViscousHistory> viscous{};  ///< null: no body is viscoelastic
 };
 
 /// The error in time that one step adds.

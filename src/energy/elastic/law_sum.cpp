@@ -14,7 +14,7 @@ namespace itr {
 namespace {
 
 StretchSum respond(const LawSum& sum, const Vec<3>& strains, double log_J, const CellVolume& volume = {}) {
-  StretchResponse response(sum.dimension, strains, log_J, volume.is_split);
+  StretchResponse response(sum.dimension, strains, log_J, volume.is_split, volume.deviator, volume.has_bulk);
   for (const LawSum::Term& term : sum.terms)
     if (term.row->add) term.row->add(term.values, response);
   if (volume.is_split) response.add_to_cell(volume_in_cell(volume, log_J));
@@ -109,18 +109,15 @@ class FibreStretch {
   Mat<Dim> M_;
 };
 
-/// Calls visit(x, w(x)) for all fibres.
+/// Calls visit(x, factor * w(x)) for all fibres.
 template <int Dim, typename Visit>
-void visit_fibres(const LawSum& sum, const Vec<3>& X, const Strain<Dim>& strain, const Visit& visit) {
+void visit_fibres(const LawSum& sum, const Vec<3>& X, const Strain<Dim>& strain, double factor, const Visit& visit) {
   for (const LawSum::Term& term : sum.terms) {
     if (!term.row->fibre) continue;
     const FibreStretch<Dim> stretch(sum, term, term.direction(X), strain);
-    FibreResponse w = term.row->fibre(term.values, stretch.value());
-    if (term.share) {
-      const double share = term.share(X, sum.time);
-      w = {share * w.value, share * w.first, share * w.second};
-    }
-    visit(stretch, w);
+    const FibreResponse w = term.row->fibre(term.values, stretch.value());
+    const double share = term.share ? factor * term.share(X, sum.time) : factor;
+    visit(stretch, FibreResponse{share * w.value, share * w.first, share * w.second});
   }
 }
 
@@ -162,7 +159,7 @@ template <int Dim>
 double sum_density(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const CellVolume& volume) {
   const Strain<Dim> strain(G);
   double W = response_to(sum, Principal<Dim>(strain).strains, strain.log_J, volume).value;
-  visit_fibres<Dim>(sum, X, strain, [&](const auto&, const FibreResponse& w) { W += w.value; });
+  visit_fibres<Dim>(sum, X, strain, volume.deviator, [&](const auto&, const FibreResponse& w) { W += w.value; });
   return W;
 }
 
@@ -173,7 +170,8 @@ Mat<Dim> sum_stress(const Mat<Dim>& G, const LawSum& sum, const Vec<3>& X, const
   const StretchSum response = response_to(sum, principal.strains, strain.log_J, volume);
   const Vec<Dim> nominal = (response.first.array() * (-principal.strains.array()).exp()).template head<Dim>();
   Mat<Dim> P = principal.U * nominal.asDiagonal() * principal.V.transpose();
-  visit_fibres<Dim>(sum, X, strain, [&](const auto& x, const FibreResponse& w) { P += w.first * x.gradient(); });
+  visit_fibres<Dim>(sum, X, strain, volume.deviator,
+                    [&](const auto& x, const FibreResponse& w) { P += w.first * x.gradient(); });
   return P;
 }
 
@@ -192,7 +190,7 @@ EigenSystem<Dim> sum_eigensystem(const Mat<Dim>& F, const LawSum& sum, const Vec
   };
   for (std::size_t k = 0; k < isotropic.values.size(); ++k) add_square(isotropic.values[k], isotropic.modes[k]);
   const Strain<Dim> strain(Mat<Dim>(F - Mat<Dim>::Identity()));
-  visit_fibres<Dim>(sum, X, strain, [&](const auto& x, const FibreResponse& w) {
+  visit_fibres<Dim>(sum, X, strain, volume.deviator, [&](const auto& x, const FibreResponse& w) {
     add_square(w.second, x.gradient());
     H += w.first * x.hessian();
   });

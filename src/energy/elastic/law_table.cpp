@@ -87,7 +87,7 @@ void add_hyperfoam(const LawValues& v, StretchResponse& at) {
 }
 
 void add_hencky(const LawValues& v, StretchResponse& at) {
-  at.add(v[1][0], at.squares());
+  at.add_squares(v[1][0]);
   add_log_bulk(v[0][0], at);
 }
 
@@ -214,6 +214,25 @@ bool may_average_volume(const Material& material, int dim) {
   if (const LawSum* sum = sum_of(material)) return !sum->is_plane_stress && volume_response(*sum, 0).second > 0;
   if (material.law == MaterialLaw::mooney_rivlin) return true;
   return material.law == MaterialLaw::neo_hookean && (dim == 3 || material.plane_strain) && material.lame_lambda(dim) > 0;
+}
+
+std::string why_not_viscous(const Material& material, int dim) {
+  if (material.eigenstrain) return "a material that has an eigenstrain";
+  if (material.law == MaterialLaw::mooney_rivlin && dim == 2)
+    return "MooneyRivlin in 2D, which has invariants of the plane; IsochoricMooneyRivlin has those of space";
+  if (material.law != MaterialLaw::own)
+    return dim == 2 && !material.plane_strain ? "plane stress; \"plane_strain\": true can be viscoelastic" : "";
+  const LawSum* sum = sum_of(material);
+  if (!sum) return "an elasticity_tensor or a law of a program, of which no part is known to be the deviator's";
+  if (sum->is_plane_stress) return "plane stress; plane strain can be viscoelastic";
+  if (sum->dimension == 2) return "invariants of the plane, of PolyFEM's defaults; ITR's are those of space";
+  for (const LawSum::Term& term : sum->terms) {
+    const std::string_view type = term.row->type;
+    if (term.share) return "a fibre whose activation varies";
+    if (type == "Hyperfoam" || type == "NeoHookean" || type == "ActiveFiber")
+      return std::string(type) + " in a law, which has no isochoric part; IsochoricNeoHookean, Yeoh and Ogden have one";
+  }
+  return "";
 }
 
 RestModuli rest_moduli(const LawSum& sum) {

@@ -88,6 +88,9 @@ bool may_average_volume(const Material& material, int dim);
 /// Whether it may, and point by point would lock linear elements: from nu = 0.48 on.
 bool is_nearly_incompressible(const Material& material, int dim);
 
+/// Why a material of bodies in `dim` dimensions (3 where they are turned) cannot be viscoelastic; empty: it can.
+std::string why_not_viscous(const Material& material, int dim);
+
 /// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
 Material material_of(const LawSum& sum, int dim);
 

@@ -99,13 +99,27 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   double E = material.youngs_modulus, nu = material.poisson_ratio;
   if (material.youngs_modulus_at) E = value_at<Dim>(material.youngs_modulus_at, X, "E", 0, kInfinity);
   if (material.poisson_ratio_at) nu = value_at<Dim>(material.poisson_ratio_at, X, "nu", -1, 0.5);
-  ElasticModuli moduli{material.law,
-                       {Material::lame_mu(E, nu), material.lame_lambda(E, nu, Dim)},
-                       material.mooney_rivlin,
-                       material.own.get(),
-                       in_space<Dim>(X)};
-  if (material.eigenstrain) moduli.growth = growth_at<Dim>(material, moduli.X);
-  return moduli;
+  const double mu = Material::lame_mu(E, nu), f = material.deviator;
+  MooneyRivlinModuli m = material.mooney_rivlin;
+  m.c1 *= f;
+  m.c2 *= f;
+  m.c3 *= f;
+  return {.law = material.law,
+          .lame = {f * mu, material.lame_lambda(E, nu, Dim) + 2.0 / 3 * (1 - f) * mu},
+          .mooney_rivlin = m,
+          .own = material.own.get(),
+          .X = in_space<Dim>(X),
+          .volume = {.deviator = f}};
+}
+
+ElasticModuli shape_part(ElasticModuli whole) {
+  if (whole.law == MaterialLaw::own)
+    whole.volume.has_bulk = false;
+  else if (whole.law == MaterialLaw::mooney_rivlin)
+    whole.mooney_rivlin.log_k = whole.mooney_rivlin.volume_d = 0;
+  else
+    whole.lame.lambda = -2.0 / 3 * whole.lame.mu;
+  return whole;
 }
 
 VolumeResponse volume_in_cell(const CellVolume& volume, double log_J) {

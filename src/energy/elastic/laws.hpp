@@ -20,8 +20,10 @@ namespace itr {
 /// (fem/volume_patches.hpp): bulk/4 (J^2 - 1 - 2 ln J) + pressure (J - 1).
 struct CellVolume {
   bool is_split = false;
-  double bulk = 0;      ///< that the other part of the law lacks to resist as neo-Hookean cells of lambda = 0 do [Pa]
-  double pressure = 0;  ///< dU/dJ of the patches [Pa]
+  double bulk = 0;       ///< that the other part of the law lacks to resist as neo-Hookean cells of lambda = 0 do [Pa]
+  double pressure = 0;   ///< dU/dJ of the patches [Pa]
+  double deviator = 1;   ///< Material::deviator, of sums of laws
+  bool has_bulk = true;  ///< false: of a sum of laws only the part that changes of shape have
 };
 
 /// The eigenstrain of a law: F = F_e F_g with F_g = I + strain, and the law sees F_e. Its density times det F_g is that of
@@ -57,6 +59,9 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X);
 /// plus volume_energy at J = det F.
 template <int Dim>
 ElasticModuli without_volume(ElasticModuli whole);
+/// The part of a law that resists changes of shape: of laws of Lame's parameters that with lambda = -2/3 mu, of others
+/// without U(J).
+ElasticModuli shape_part(ElasticModuli whole);
 /// U and its derivatives by J at J = 1 + change.
 template <int Dim>
 VolumeResponse volume_energy(const ElasticModuli& whole, double change);

@@ -48,16 +48,21 @@ StretchSum StretchResponse::isochoric_powers(double alpha) const {
 
 StretchSum StretchResponse::powers(double alpha) const { return powers_of(alpha, strains_); }
 
-StretchSum StretchResponse::squares() const {
+void StretchResponse::add_squares(double factor) {
   StretchSum S;
   S.value = strains_.head(dimension_).squaredNorm();
   S.first.head(dimension_) = 2 * strains_.head(dimension_);
   S.second.diagonal().head(dimension_).setConstant(2);
   S.divided.setConstant(2);
-  return S;
+  add(factor, S);
+  const double k = 2 * factor / dimension_ * (bulk_ - deviator_);
+  if (k != 0) add_to_cell({k / 2 * log_J_ * log_J_, k * log_J_, k});
 }
 
 void StretchResponse::add(double f, double d1, double d2, const StretchSum& S) {
+  f *= deviator_;
+  d1 *= deviator_;
+  d2 *= deviator_;
   sum_.value += f;
   sum_.first += d1 * S.first;
   sum_.second += d1 * S.second + d2 * S.first * S.first.transpose();

@@ -26,9 +26,16 @@ VolumeResponse square_bulk(double bulk, double log_J);
 class StretchResponse {
  public:
   /// `dimension`: how many stretches the law has, 3, or 2 where those in the plane are all. `log_J` is their sum. With
-  /// `is_split` the sum has no volumetric parts.
-  StretchResponse(int dimension, const Vec<3>& strains, double log_J, bool is_split = false)
-      : dimension_(dimension), strains_(strains), log_J_(log_J), is_split_(is_split) {}
+  /// `is_split` the sum has no volumetric parts. What is added by `add` counts `deviator` times; without `has_bulk` there is
+  /// nothing else.
+  StretchResponse(int dimension, const Vec<3>& strains, double log_J, bool is_split = false, double deviator = 1,
+                  bool has_bulk = true)
+      : dimension_(dimension),
+        strains_(strains),
+        log_J_(log_J),
+        is_split_(is_split || !has_bulk),
+        deviator_(deviator),
+        bulk_(has_bulk ? 1 : 0) {}
 
   int dimension() const { return dimension_; }
   double log_J() const { return log_J_; }
@@ -39,12 +46,12 @@ class StretchResponse {
   StretchSum isochoric_powers(double alpha) const;
   /// sum_i (s_i^alpha - 1) - alpha ln J.
   StretchSum powers(double alpha) const;
-  /// sum_i e_i^2.
-  StretchSum squares() const;
 
   /// Adds f(S); `d1`, `d2`: f' and f''.
   void add(double f, double d1, double d2, const StretchSum& S);
   void add(double factor, const StretchSum& S) { add(factor * S.value, factor, 0, S); }
+  /// Adds factor sum_i e_i^2, of which factor / dimension (ln J)^2 is no change of shape.
+  void add_squares(double factor);
   /// Adds U(ln J) with its derivatives by ln J, as a volumetric part.
   void add_volume(double U, double d1, double d2);
   /// Adds a function of ln J that stays in the cells.
@@ -57,6 +64,7 @@ class StretchResponse {
   Vec<3> strains_;
   double log_J_;
   bool is_split_;
+  double deviator_, bulk_;
   StretchSum sum_;
   VolumeResponse volume_;
 };
