@@ -62,7 +62,7 @@ enum class TermKind {
   damping,
   contact_damping
 };
-inline constexpr std::size_t kNumTermKinds = 14;
+inline constexpr std::size_t kNumTermKinds = 15;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
