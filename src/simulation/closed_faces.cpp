@@ -104,10 +104,18 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
   const CellSet<Dim> cells = setup.ties.empty() ? CellSet<Dim>() : whole_mesh(mesh, {});
   for (const auto& mortar : mortars_of(setup, mesh, cells))
     for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
+  std::vector<char> bonded(mesh.num_vertices(), 0);
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v) bonded[v] = mesh.steps_apart(v) == 0;
   const std::vector<char> all(mesh.num_nodes(), 1);
   for_each_coincident_pair<Dim>(mesh, all, [&](PairKind kind, const std::array<int, 4>& vertices) {
     // Bodies that coincide are in contact where a start without overlap is found.
     if (setup.contact.resolve_overlap && !is_of_one_part(mesh, vertices, pair_size(kind))) return;
+    std::set<int> parts;  // that a tie closes here already
+    for (int k = 0; k < pair_size(kind); ++k)
+      for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) {
+        if (bonded[v]) parts.insert(mesh.part_of_vertex(v));
+      });
+    if (parts.size() > 1) return;
     for (int k = 0; k < pair_size(kind); ++k)
       for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { mesh.set_steps_apart(v, 0); });
   });
