@@ -27,6 +27,8 @@ std::vector<Material> laws_with(const Eigenstrain& eigenstrain) {
       laws.back().mooney_rivlin = {.c1 = 20, .c2 = 5, .c3 = 3, .log_k = 100, .volume_d = 30};
     }
   for (const LawSum& sum : sums_of_all_laws<Dim>()) laws.push_back(material_of(sum, Dim));
+  for (const LawRow& row : law_rows())
+    if (std::string_view(row.type) == "HGOFiber") laws.push_back(material_of(sum_of(row, 3, false), Dim));
   MatrixX C = MatrixX::Identity(Dim == 2 ? 3 : 6, Dim == 2 ? 3 : 6) * 90;
   C.topLeftCorner(Dim, Dim).array() += 40;
   C(0, 0) = 200;

@@ -99,11 +99,11 @@ itr::Setup<2> press_fit(int around, int through) {
 
 TEST(Overlap, RingsPressAsLameSays) {
   linear::Registry registry;
-  Simulation<2> simulation(press_fit(180, 8), registry);
+  Simulation<2> simulation(press_fit(300, 14), registry);
   EXPECT_LE(simulation.setup().contact.dhat, 0.01 * kOverlap);
   const double p = press_fit_pressure(kA, kB, kC, kE, kNu, kOverlap);
   const double stored = simulation.interference_energy();
-  EXPECT_NEAR(stored, p * kOverlap / 2 * std::numbers::pi / 2 * kB, 0.01 * stored);  // half of force times way
+  EXPECT_NEAR(stored, p * kOverlap / 2 * std::numbers::pi / 2 * kB, 0.015 * stored);  // half of force times way
   const StepResult result = advance(simulation);
   EXPECT_NEAR(mean_radial_stress(simulation, 1, kB), -p, 0.005 * p);
   EXPECT_NEAR(mean_radial_stress(simulation, 2, kB), -p, 0.005 * p);

@@ -31,7 +31,7 @@ constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, litt
 constexpr double kDhatByThicknessIfPressed = 2e-4;
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
 constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
-constexpr double kDhatByOverlap = 0.005;  ///< of the overlap that is resolved, as long as that leaves kLeastByOverlap
+constexpr double kDhatByOverlap = 0.002;  ///< of the overlap that is resolved, as long as that leaves kLeastByOverlap
 constexpr double kLeastByOverlap = 1e-3;
 constexpr double kDhatByMotion = 0.01;    ///< of the way that is prescribed without inertia
 constexpr double kDhatByGrowth = 0.0025;  ///< of what eigenstrains change of a thickness: it gives little interference
