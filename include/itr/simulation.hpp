@@ -92,7 +92,7 @@ class ITR_EXPORT Simulation {
   /// All that steps depend on, for output::Writer and restore(). Valid while no snapshot shares it.
   const State<Dim>& state() const;
   const Setup<Dim>& setup() const;
-  /// Energy that bodies and contact stored at the start, where ContactOptions::resolve_overlap found surfaces that touched [J].
+  /// Energy stored at the start, where ContactOptions::resolve_overlap found surfaces that touched [J].
   double interference_energy() const;
   const NodalForces& forces() const;       ///< the forces that the setup asks for, at the end of the last step
   std::string solver_name() const;         ///< the name in the setup, such as "auto"
