@@ -79,9 +79,9 @@ Setup<Dim> driven(const Material& material, const Motion<Dim>& F, double dt, int
   setup.materials[1] = material;
   const auto displacement = [F](const Vec<Dim>& X, double t) { return Vec<Dim>(F(t) * X - X); };
   for (const int tag : {1, 2, 3, 4}) {
-    typename DirichletCondition<Dim>::Components all;
-    all.fill(true);
-    setup.dirichlet.push_back({tag, all, displacement});
+    DirichletCondition<Dim> condition{tag, {}, displacement};
+    condition.components.fill(true);
+    setup.dirichlet.push_back(condition);
   }
   setup.initial_displacement.push_back({1, displacement});
   setup.time = {.quasistatic = true, .dt = dt, .steps = steps};

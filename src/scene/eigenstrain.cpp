@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "eigenstrain.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <array>
 #include <sstream>
 #include <string>
@@ -41,7 +44,7 @@ class EigenstrainReader {
         found << strain(0, 0);
       else
         found << "(" << strain.format(in_rows) << ")";
-      found << " at X = (" << X.transpose() / length << "), t = " << t / second;
+      found << fmt::format(" at X = ({:g}), t = {:g}", fmt::join(Vec<3>(X / length), ", "), t / second);
       InputError::Parts wrong = parts;
       wrong.found = found.str();
       throw InputError(wrong);

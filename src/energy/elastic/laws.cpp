@@ -104,12 +104,14 @@ ElasticModuli elastic_moduli(const Material& material, const Vec<Dim>& X) {
   m.c1 *= f;
   m.c2 *= f;
   m.c3 *= f;
-  return {.law = material.law,
-          .lame = {f * mu, material.lame_lambda(E, nu, Dim) + 2.0 / 3 * (1 - f) * mu},
-          .mooney_rivlin = m,
-          .own = material.own.get(),
-          .X = in_space<Dim>(X),
-          .volume = {.deviator = f}};
+  ElasticModuli moduli{.law = material.law,
+                       .lame = {f * mu, material.lame_lambda(E, nu, Dim) + 2.0 / 3 * (1 - f) * mu},
+                       .mooney_rivlin = m,
+                       .own = material.own.get(),
+                       .X = in_space<Dim>(X),
+                       .volume = {.deviator = f}};
+  if (material.eigenstrain) moduli.growth = growth_at<Dim>(material, moduli.X);
+  return moduli;
 }
 
 ElasticModuli shape_part(ElasticModuli whole) {
