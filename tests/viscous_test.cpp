@@ -96,7 +96,7 @@ Mat<Dim> stress_in(const Simulation<Dim>& simulation, std::size_t cell = 0) {
   return Eigen::Map<const Mat<Dim>>(&stress.at(cell * Dim * Dim));
 }
 
-/// Of the law with other moduli of shape.
+/// Stress of the law with other moduli of shape.
 template <int Dim>
 Mat<Dim> stress_of(Material material, double deviator, const Mat<Dim>& F) {
   material.deviator = deviator;

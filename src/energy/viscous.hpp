@@ -90,7 +90,7 @@ class ViscousStep {
   bool acts_on(int body) const { return materials_.contains(body); }
   /// H in an element.
   Stress past(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const;
-  /// What the energy that the bodies store at x exceeds the potential's by, without scale [J].
+  /// Energy that the bodies store at x beyond the potential's, without scale [J].
   double stored_excess(const CellSet<Dim>& cells, ConstVectorView x) const;
 
   struct End {

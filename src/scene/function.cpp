@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "function.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
-#include <sstream>
 
 #include "expression.hpp"
 #include "interpolation.hpp"
@@ -37,10 +38,9 @@ struct SceneUnits {
   /// Throws InputError: the value is not finite at X and t.
   template <int Dim>
   [[noreturn]] void fail(const Vec<Dim>& X, double t) const {
-    std::ostringstream found;
-    found << value.found << ", which has no finite value at X = (" << X.transpose() / length << "), t = " << t / time;
     InputError::Parts parts = value;
-    parts.found = found.str();
+    parts.found = fmt::format("{}, which has no finite value at X = ({:g}), t = {:g}", value.found,
+                              fmt::join(Vec<Dim>(X / length), ", "), t / time);
     throw InputError(parts);
   }
   template <int Dim>

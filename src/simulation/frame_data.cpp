@@ -123,7 +123,7 @@ struct FrameCells {
                        const CellPoint<Dim>& point) const {
     return pressures.in(cell_moduli<Dim>(cells, material, point.X), number(element), point.weights);
   }
-  /// What the past adds to the stress in space and to the energy density at a point of an element.
+  /// Stress in space and energy density that the past adds at a point of an element.
   std::pair<Mat<3>, double> past(const Material& material, const typename CellSet<Dim>::Element& element,
                                  const CellPoint<Dim>& point) const {
     if (!viscous || material.prony.empty()) return {Mat<3>::Zero(), 0};
