@@ -5,6 +5,7 @@
 
 #include "energy/cavity.hpp"
 #include "energy/mapped.hpp"
+#include "energy/rigid_body.hpp"
 
 namespace itr {
 
@@ -20,6 +21,33 @@ void renew_term(std::shared_ptr<Term>& term, bool is_needed, const auto& cells, 
   else
     term = std::make_shared<Term>(cells, arguments...);
 }
+
+/// Elasticity without the cells of rigid bodies, to be damped.
+template <int Dim>
+class WithoutRigidBodies final : public Energy {
+ public:
+  WithoutRigidBodies(const Energy& elastic, const CellSet<Dim>& cells, const std::map<int, Material>& materials)
+      : elastic_(elastic), is_rigid_(cells.rest.size(), 0) {
+    for (const auto& element : cells.elements)
+      if (rigid_body_of(materials.at(element.body)))
+        for (const int v : element.vertices) is_rigid_[v] = 1;
+  }
+  std::string_view name() const override { return elastic_.name(); }
+  double value(ConstVectorView x, Workspace& workspace) const override { return elastic_.value(x, workspace); }
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override {
+    elastic_.add_gradient(x, gradient, workspace);
+  }
+  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override {
+    HessianSink others([&](std::span<const int> vertices, const double* block) {
+      if (!is_rigid_[vertices[0]]) sink.add<Dim>(vertices, block);
+    });
+    elastic_.add_hessian(x, psd, others, workspace);
+  }
+
+ private:
+  const Energy& elastic_;
+  std::vector<char> is_rigid_;
+};
 
 /// The friction that was lagged last: made anew where nothing refers to it any more.
 template <int Dim>
@@ -121,7 +149,10 @@ typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstV
   for (const DampingOptions& options : terms_->damping) {
     if (options.term != DampingOptions::Term::contact)
       lagged.damping.push_back(
-          std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity(), workspace));
+          has_rigid_bodies(terms_->materials)
+              ? std::make_shared<DampingEnergy<Dim>>(WithoutRigidBodies<Dim>(*elastic_, cells_, terms_->materials), x,
+                                                     options.coefficient, velocity(), workspace)
+              : std::make_shared<DampingEnergy<Dim>>(*elastic_, x, options.coefficient, velocity(), workspace));
     else if (contact_)
       lagged.contact_damping.push_back(of_cells(std::make_shared<DampingEnergy<Dim>>(
           *contact_, on_surface(x), options.coefficient, velocity_of_surface(), workspace)));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "energy/blocking.hpp"
@@ -13,7 +14,7 @@ namespace itr {
 /// E(y(x)) for a term E over vertices y that follow linearly from those of the problem: gradient A^T g, Hessian A^T H A.
 /// Along a straight way of x also y goes straight, so that what bounds a step of y bounds that of x.
 template <int Dim>
-class MappedEnergy final : public Energy {
+class MappedEnergy : public Energy {
  public:
   MappedEnergy(std::shared_ptr<const Energy> energy, std::shared_ptr<const VertexMap<Dim>> map)
       : energy_(std::move(energy)), map_(std::move(map)) {}
@@ -50,6 +51,31 @@ class MappedEnergy final : public Energy {
     });
     energy_->add_hessian(map_->positions(x), psd, mapped, workspace);
   }
+  void add_gradient_and_sizes(ConstVectorView x, VectorView gradient, VectorView sizes,
+                              Workspace& workspace) const override {
+    const VectorX y = map_->positions(x);
+    VectorX gradient_in_y = VectorX::Zero(y.size()), sizes_in_y = gradient_in_y;
+    energy_->add_gradient_and_sizes(y, gradient_in_y, sizes_in_y, workspace);
+    map_->add_gradient(gradient_in_y, gradient);
+    add_sizes(sizes_in_y, sizes);
+  }
+  double value_round_off(ConstVectorView x, Workspace& workspace) const override {
+    return energy_->value_round_off(map_->positions(x), workspace);
+  }
+  void add_gradient_round_off(ConstVectorView x, VectorView round_off, Workspace& workspace) const override {
+    const VectorX y = map_->positions(x);
+    VectorX in_y = VectorX::Zero(y.size());
+    energy_->add_gradient_round_off(y, in_y, workspace);
+    add_sizes(in_y, round_off);
+  }
+  void add_rank_ones(ConstVectorView x, std::vector<RankOne>& parts) const override {
+    std::vector<RankOne> in_y;
+    energy_->add_rank_ones(map_->positions(x), in_y);
+    for (const RankOne& part : in_y) {
+      parts.push_back({VectorX::Zero(x.size()), part.factor});
+      map_->add_gradient(part.vector, parts.back().vector);
+    }
+  }
   double max_step(ConstVectorView x, ConstVectorView dx, Workspace& workspace) const override {
     return energy_->max_step(map_->positions(x), map_->motion(dx), workspace);
   }
@@ -71,6 +97,14 @@ class MappedEnergy final : public Energy {
   }
 
  private:
+  /// Adds to the sizes of forces on x those of forces on y.
+  void add_sizes(const VectorX& sizes, VectorView result) const {
+    for (int i = 0; Dim * i < sizes.size(); ++i)
+      for (std::size_t k = 0; k < map_->sources(i).size(); ++k)
+        result.segment<Dim>(Dim * map_->sources(i)[k]) +=
+            std::abs(map_->weights(i)[k]) * sizes.template segment<Dim>(Dim * i);
+  }
+
   std::shared_ptr<const Energy> energy_;
   std::shared_ptr<const VertexMap<Dim>> map_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/timer.hpp"
+#include "energy/arcs.hpp"
 #include "newton/newton.hpp"
 
 namespace itr {
@@ -144,6 +145,7 @@ constexpr double kArmijo = 1e-4;
 constexpr double kResolved = 8;  ///< times its round-off: changes of energy below which slopes tell more
 constexpr double kLeastFraction = 1e-14;
 constexpr double kStraightFall = 0.8;  ///< of the slope: an energy that falls by more over a full step hardly curves
+constexpr double kShorter = 0.9;       ///< of an arc, at most, where its chord is not free
 constexpr int kMostHalvings = 40, kMostDoublings = 12;
 constexpr double kVertexStepsBelow = 0.25;  ///< see try_vertex_steps
 constexpr double kBlockedBelow = 0.5;       ///< fraction of a step below which what is in the way is looked at
@@ -162,6 +164,8 @@ Search::Search(const Task& task, Iterate& at, DirichletContinuation& held)
 
 bool Search::along(Step& step) {
   const bool advancing = held_.is_advancing();
+  const auto* const arcs = dynamic_cast<const Arcs*>(&task_.energy);
+  if (arcs && along_arcs(*arcs, step)) return true;
   const Ahead ahead = look_ahead(step);
   if (advancing && ahead.fraction < kWaitBelow) held_.wait();
   if (ahead.fraction < kBlockedBelow) note_blocked(step);
@@ -179,6 +183,36 @@ bool Search::along(Step& step) {
     if (straight) go_on(step.direction);
     return true;
   }
+  return false;
+}
+
+/// Goes to where a part of the step leads along arcs, on the straight way there, which has to be free for its whole length:
+/// halves of a chord are no shorter arcs. While held dofs advance, only bends the step.
+bool Search::along_arcs(const Arcs& arcs, Step& step) {
+  constexpr double kStraight = 1e-5;  // [rad]: arcs that turn by less are their chords
+  const VectorX whole = step.direction;
+  if (arcs.bend(at_.x(), step.direction) < kStraight) return false;
+  if (held_.is_advancing()) return false;
+  double length = 1;
+  for (int i = 0; i < kMostHalvings && length > kLeastFraction; ++i) {
+    if (i > 0) {
+      step.direction = length * whole;
+      arcs.bend(at_.x(), step.direction);
+    }
+    if (const double free = at_.free_fraction(step.direction); free < 1) {
+      if (i == 0 && free < kBlockedBelow) note_blocked(step);
+      length *= std::min(std::max(free, kLeastFraction), kShorter);
+      continue;
+    }
+    candidate_ = at_.x() + step.direction;
+    const double value = at_.value_at(candidate_), slope = task_.norms.dot(step.direction, at_.gradient());
+    if (std::isfinite(value) && slope < 0 && is_acceptable(value, 1, {1, slope, false}, step)) {
+      at_.move_to(candidate_, value);
+      return true;
+    }
+    length /= 2;
+  }
+  step.direction = whole;
   return false;
 }
 

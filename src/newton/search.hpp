@@ -5,6 +5,8 @@
 
 namespace itr {
 
+class Arcs;
+
 /// How far to go along a step: as far as the energy falls and the way is free. A step that contact or inversion blocks is
 /// turned first, or each vertex goes as far as it can alone.
 class Search {
@@ -27,6 +29,7 @@ class Search {
     double slope;           ///< of the energy
     bool has_vertex_steps;  ///< those of each vertex alone are known
   };
+  bool along_arcs(const Arcs& arcs, Step& step);
   Ahead look_ahead(Step& step);
   bool is_acceptable(double value, double fraction, const Ahead& ahead, const Step& step);
   bool falls_straight(double value, double fraction, const Ahead& ahead, const Step& step);

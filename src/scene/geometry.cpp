@@ -16,6 +16,7 @@
 #include "file_parts.hpp"
 #include "mesh/refine.hpp"
 #include "readers.hpp"
+#include "rigid.hpp"
 #include "selection.hpp"
 #include "selection_file.hpp"
 #include "transformation.hpp"
@@ -156,6 +157,7 @@ class Keys {
         parts_(parts),
         sets_(sets) {
     if (const Label name{0, geometry["name"].string("")}; references.bodies.contains(name)) name_.insert(name);
+    if (is_rigid(geometry)) name_.insert(rigid_label(geometry));
   }
 
   /// A selection decides the number; names of the file, and that of the geometry, stay.
@@ -202,7 +204,7 @@ class Keys {
 
   const FileParts<Dim>& parts_;
   Sets& sets_;
-  std::set<Label> name_;  ///< of the geometry, if the scene asks for it
+  std::set<Label> name_;  ///< of the geometry, if the scene asks for it, and of a rigid body
   std::map<std::pair<int, Label>, int> cells_;
   std::map<std::pair<int, std::optional<Label>>, int> facets_;
 };
@@ -282,8 +284,11 @@ void put_on_axis(const Node& geometry, std::vector<Vec<Dim>>& points) {
 namespace {
 
 template <int Dim>
-void read_body(const Node& geometry, const MeshFile& of_mesh, const References& references, Sets& sets, Collected<Dim>& all,
+void read_body(const Node& geometry, const MeshFile& of_file, const References& references, Sets& sets, Collected<Dim>& all,
                std::vector<std::string>& warnings) {
+  const bool is_filled = Dim == 3 && is_rigid(geometry) && of_file.tetrahedra.empty();
+  const MeshFile filled = is_filled ? filled_surface(geometry, of_file) : MeshFile();
+  const MeshFile& of_mesh = is_filled ? filled : of_file;
   const bool has_files = has_selection_files(geometry);
   MeshFile with_selections;
   if (has_files) add_selection_files(geometry, Dim, with_selections = of_mesh);
@@ -311,6 +316,7 @@ void read_body(const Node& geometry, const MeshFile& of_mesh, const References& 
 int dimension_of(const Node& geometry, const MeshFile& file) {
   if (!file.tetrahedra.empty()) return 3;
   if (file.triangles.empty()) geometry["mesh"].fail("a mesh without cells", "triangles (2D) or tetrahedra (3D)");
+  if (is_rigid(geometry) && !is_flat(file)) return 3;
   if (!is_flat(file))
     geometry["mesh"].fail("a surface mesh, " + abbreviate(geometry["mesh"].json()),
                           "tetrahedra, or a flat mesh: all vertices at one z (2D)");
@@ -413,6 +419,9 @@ Geometries list_geometries(const Node& root) {
     const bool is_array = type == 1;
     if (is_array != geometry.has("array")) geometry["array"].fail("an array if and only if type is \"mesh_array\"");
     const bool is_obstacle = is_flat_obstacle || geometry["is_obstacle"].boolean(false);
+    if (geometry.has("rigid") && (is_obstacle || is_array))
+      geometry["rigid"].fail(is_obstacle ? "a rigid body that is an obstacle" : "a rigid body that is an array of copies",
+                             is_obstacle ? "one of both" : "one geometry for each rigid body");
     if (!is_obstacle && geometry["extract"].string("volume") != "volume")
       geometry["extract"].fail("\"volume\" for what is no obstacle");
     (is_obstacle ? geometries.obstacles : geometries.bodies).push_back(geometry);

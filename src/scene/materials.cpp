@@ -11,6 +11,7 @@
 #include "function.hpp"
 #include "law_reader.hpp"
 #include "readers.hpp"
+#include "rigid.hpp"
 
 namespace itr::scene {
 
@@ -300,8 +301,13 @@ template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
                                        std::vector<std::string>& warnings) {
   const Node node = root["materials"];
-  if (!node.exists()) node.fail("the materials of the bodies");
-  const auto points = barycenters_by_body(mesh);
+  const std::set<int> rigid = rigid_ids(root, bodies);
+  auto points = barycenters_by_body(mesh);
+  std::erase_if(points, [&](const auto& of_body) { return rigid.contains(of_body.first); });
+  if (!node.exists()) {
+    if (points.empty()) return {};
+    node.fail("the materials of the bodies");
+  }
   const bool has_inertia = root.has("time") && !root["time"]["quasistatic"].boolean(false);
   for (const Node& entry : node.items())
     if ((has_inertia || root["boundary_conditions"].has("rhs")) && !entry.has("rho"))
@@ -322,7 +328,11 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   std::map<int, Label> first_label;
   for (const Node& entry : node.items()) {
     MaterialReader reader(entry, space, is_polyfem, has_patches);
-    for (const auto& [label, id] : ids_of(entry, bodies, points)) {
+    std::vector<std::pair<Label, int>> ids = ids_of(entry, bodies, points);
+    const auto of_rigid = std::erase_if(ids, [&](const auto& of_label) { return rigid.contains(of_label.second); });
+    if (of_rigid > 0 && ids.empty())
+      warnings.push_back(entry.pointer() + ": of a rigid body, whose mass /geometry/*/rigid says: it has no effect");
+    for (const auto& [label, id] : ids) {
       const auto of_body = points.find(id);
       const Material material = reader.checked(of_body == points.end() ? std::vector<Vec<3>>{} : of_body->second, warnings);
       const auto [first, is_new] = first_label.emplace(id, label);

@@ -11,6 +11,7 @@
 #include "mesh/rest_box.hpp"
 #include "polyfem/python_value.hpp"
 #include "readers.hpp"
+#include "rigid.hpp"
 #include "selection_file.hpp"
 #include "transformation.hpp"
 
@@ -98,6 +99,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   setup.quadrature_degree = read_quadrature_degree(root);
   setup.newton = read_newton(root, characteristic_length(root, setup.time), {Dim, rest_box(setup.mesh).diagonal().norm()});
   setup.materials = read_materials(root, sets.bodies, setup.mesh, warnings);
+  read_rigid_bodies(root, sets.bodies, setup);
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   read_preset_problem<Dim>(root, sets.bodies, setup);
   setup.ties = read_ties<Dim>(root, sets, setup.mesh);

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "barrier_stiffness.hpp"
+#include "energy/rigid_body.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "mesh/rest_box.hpp"
@@ -46,6 +47,65 @@ constexpr double kCollapseFraction = 0.01;
 /// Swaps and moves for the sake of the shape: hardly more than round-off, as they gain nothing else.
 constexpr double kShapeFraction = 1e-6;
 constexpr double kUsualStrain2 = 0.01;  ///< square of the strain at which bodies are expected to store energy
+
+/// The largest modulus of bodies that deform [Pa].
+template <int Dim>
+double stiffest_modulus(const Setup<Dim>& setup) {
+  double stiffest = 0;
+  for (const auto& [body, material] : setup.materials)
+    if (!rigid_body_of(material)) stiffest = std::max(stiffest, material.youngs_modulus);
+  return stiffest;
+}
+
+/// The largest of a force of time, at times from the first step's to far beyond any end: no choice depends on the end.
+template <typename Function>
+double largest_norm(const Function& f, const TimeOptions& time) {
+  constexpr int kDoublings = 16;
+  double largest = 0;
+  for (int k = 0; f && k <= kDoublings; ++k)
+    if (const double norm = f(time.t0 + std::ldexp(time.dt, k)).norm(); std::isfinite(norm))
+      largest = std::max(largest, norm);
+  return largest;
+}
+
+/// A modulus with which bodies would strain by a hundredth where rigid bodies press or fall on them, those that are there
+/// aside [Pa].
+template <int Dim>
+double usual_modulus(const Setup<Dim>& setup) {
+  constexpr double kStrain = 0.01;
+  auto box = rest_box(setup.mesh);
+  double pressure = 0;
+  for (const auto& [body, ids] : rigid_bodies(setup.materials)) {
+    Eigen::AlignedBox<double, Dim> own;
+    double mass = 0, speed = 0;
+    for (const CellId c : setup.mesh.live_cells()) {
+      if (rigid_body_of(setup.materials.at(setup.mesh.body(c))) != body) continue;
+      const Vec<Dim> X = setup.mesh.barycenter(c);
+      mass += setup.materials.at(setup.mesh.body(c)).density * setup.mesh.volume(c);
+      for (const VertexId v : setup.mesh.cell(c)) own.extend(setup.mesh.rest(v));
+      for (const auto& condition : setup.initial_velocity)
+        if (condition.body == setup.mesh.body(c)) speed = std::max(speed, condition.value(X, setup.time.t0).norm());
+    }
+    const double size = own.diagonal().norm(), area = std::pow(size, Dim - 1);
+    const double gravity =
+        setup.body_acceleration ? setup.body_acceleration(Vec<Dim>(own.center()), setup.time.t0).norm() : 0;
+    const double load = largest_norm(body->force, setup.time) + largest_norm(body->moment, setup.time) / size;
+    pressure = std::max(pressure, (load + mass * gravity) / area);
+    if (!setup.time.has_inertia()) continue;
+    speed = std::max(speed, prescribed_speed(setup, Vec<Dim>(own.center()), kFirstSteps));
+    const double energy = mass * speed * speed + (load + mass * gravity) * box.diagonal().norm();
+    pressure = std::max(pressure, energy / (area * size));
+  }
+  return std::max(stiffest_modulus(setup), pressure / kStrain);
+}
+
+template <int Dim>
+void choose_rigid_moduli(Setup<Dim>& setup) {
+  constexpr double kRigid = 1e4;  ///< times what else there is: strains of 1e-6, where bodies on it strain by 1e-2
+  const double modulus = kRigid * usual_modulus(setup);
+  for (auto& [body, material] : setup.materials)
+    if (rigid_body_of(material) && modulus > 0) material.youngs_modulus = modulus;
+}
 
 /// Mean surface of a vertex on the boundary [m], [m^2].
 template <int Dim>
@@ -121,8 +181,7 @@ namespace {
 
 template <int Dim>
 std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
-  double stiffest = 0;
-  for (const auto& [body, material] : setup.materials) stiffest = std::max(stiffest, material.youngs_modulus);
+  const double stiffest = std::max(stiffest_modulus(setup), has_rigid_bodies(setup.materials) ? usual_modulus(setup) : 0);
   contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
   const Units& units = setup.units;
   return fmt::format(
@@ -163,7 +222,8 @@ std::string choose_friction_velocity(const Setup<Dim>& setup, ContactOptions& co
   }
   if (prescribed == 0 && fall == 0)
     for (const auto& [body, material] : setup.materials)
-      prescribed = std::max(prescribed, kStrain * std::sqrt(material.youngs_modulus / material.density));
+      if (!rigid_body_of(material))
+        prescribed = std::max(prescribed, kStrain * std::sqrt(material.youngs_modulus / material.density));
   const bool is_by_fall = fall > 0 && (prescribed == 0 || kSlipByFall * fall < kSlipByMotion * prescribed);
   contact.friction_velocity = is_by_fall ? kSlipByFall * fall : kSlipByMotion * prescribed;
   const Units& units = setup.units;
@@ -230,8 +290,9 @@ template <int Dim>
 std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
   double energy = 0;
   for (const CellId c : setup.mesh.live_cells())
-    energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
-              turn_at(setup.mesh, setup.mesh.barycenter(c));
+    if (!rigid_body_of(setup.materials.at(setup.mesh.body(c))))
+      energy += kUsualStrain2 * setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
+                turn_at(setup.mesh, setup.mesh.barycenter(c));
   const double available = available_energy(setup);
   if (available > 0) energy = std::min(energy, available);
   setup.follows_stored_energy.split = available == 0;
@@ -275,6 +336,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
   if (contact.enabled && !this->ties.empty()) contact.tie_reach = tie_reach(*this);
+  if (has_rigid_bodies(this->materials)) choose_rigid_moduli(*this);
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));
   if (contact.enabled && contact.barrier_stiffness == 0)

@@ -18,6 +18,7 @@
 #include "simulation/flat_obstacles.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/named.hpp"
+#include "simulation/rigid_coordinates.hpp"
 
 namespace itr {
 
@@ -177,6 +178,27 @@ void refuse_open_ties(const Setup<Dim>& setup, const State<Dim>& state) {
   if (!state.history.a.empty()) check("acceleration", state.history.a[0]);
 }
 
+/// Refuses initial positions and velocities of rigid bodies that are not those of rigid motions.
+template <int Dim>
+void refuse_deformed(const Setup<Dim>& setup, const State<Dim>& state) {
+  constexpr double kRigid = 1e-6;  ///< of the body
+  if (!has_rigid_bodies(setup.materials)) return;
+  const RigidCoordinates<Dim> rigid(setup.materials, whole_mesh(state.mesh, setup.obstacles.rest));
+  const auto vectors = [&](int body, const VectorX& field) {
+    return Mat<Dim>(rigid.frame(body, field).template rightCols<Dim>() / rigid.size(body));
+  };
+  for (int b = 0; b < rigid.count(); ++b) {
+    const Mat<Dim> F = vectors(b, state.history.x[0]), rate = vectors(b, state.history.v[0]);
+    const double speed = rate.norm() + rigid.frame(b, state.history.v[0]).col(0).norm() / rigid.size(b);
+    if (!(rigid.distortion(b, state.history.x[0]) <= kRigid && (F.transpose() * F - Mat<Dim>::Identity()).norm() <= kRigid))
+      throw InputError({"", "/initial_conditions/solution", "a displacement that deforms a rigid body", "a rigid motion"});
+    const Mat<Dim> stretching = F.transpose() * rate + rate.transpose() * F;
+    if (!(rigid.distortion(b, state.history.v[0]) <= kRigid * speed && stretching.norm() <= kRigid * speed))
+      throw InputError({"", "/initial_conditions/velocity", "a velocity that deforms a rigid body",
+                        "that of a rigid motion: v0 + omega x X (2D: [\"-w*y\", \"w*x\"])"});
+  }
+}
+
 template <int Dim>
 Mesh<Dim> initial_mesh(const Setup<Dim>& setup) {
   Mesh<Dim> mesh = setup.mesh;
@@ -203,6 +225,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   state.history.viscous = begin_viscous<Dim>(state.mesh, setup.materials, state.history.x[0], state.t);
+  refuse_deformed(setup, state);
   return state;
 }
 

@@ -16,7 +16,9 @@
 
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
+#include "energy/arcs.hpp"
 #include "energy/least_motion.hpp"
+#include "energy/mapped.hpp"
 #include "energy/polyfem/lagged_regularization.hpp"
 #include "fem/hessian_sink.hpp"
 #include "flight_guard.hpp"
@@ -43,6 +45,20 @@ constexpr int kLooseRounds = 4;                ///< at most: what goes on for lo
 constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
+/// The energy of an increment as a function of its coordinates.
+template <int Dim>
+class EnergyByCoordinates final : public MappedEnergy<Dim>, public Arcs {
+ public:
+  /// `rigid` must outlive this; `base`: where increments begin.
+  EnergyByCoordinates(std::shared_ptr<const Energy> energy, const RigidCoordinates<Dim>& rigid, ConstVectorView base)
+      : MappedEnergy<Dim>(std::move(energy), rigid.map()), rigid_(rigid), base_(rigid.coordinates_of(base)) {}
+  double bend(ConstVectorView x, VectorView step) const override { return rigid_.bend(base_ + x, step); }
+
+ private:
+  const RigidCoordinates<Dim>& rigid_;
+  VectorX base_;
+};
+
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
 
 }  // namespace
@@ -58,7 +74,7 @@ class LaggedSolve {
     VectorX step_to_start;
     {
       const ScopedTimer timer(lagging_seconds);
-      const VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
+      const VectorX start = along_arcs(with_held_at_targets(expected.size() > 0 ? expected : x));
       if (potential_.contact())
         potential_.contact()->predict_motion(surface_.positions(x), surface_.motion(start - x), workspace_);
       const bool is_first_step = std::isinf(stiffness_.largest);
@@ -231,6 +247,7 @@ class LaggedSolve {
   double residual_of(const VectorX& x, const Lagged& lagged) {
     VectorX gradient = VectorX::Zero(x.size());
     EnergyOfIncrement(potential_.sum(lagged), base_).add_gradient(problem_.increment_of(x), gradient, workspace_);
+    if (rigid_) gradient = rigid_->without_reactions(std::move(gradient));
     return Norms(dofs_, NewtonNorm::euclidean, {}).of_gradient(gradient);
   }
   /// One solve with `lagged_`, which `ends_at(x)`, if given, ends at an iterate. Adaptive stiffness balances the terms
@@ -238,7 +255,10 @@ class LaggedSolve {
   NewtonSummary minimize_lagged(VectorX& x, VectorX step_to_start = {},
                                 const std::function<bool(const VectorX& x)>& ends_at = {}) {
     const EnergySum sum = potential_.sum(lagged_);
-    if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) norm_weights_ = unit_mass_diagonal(cells_);
+    if (norm_weights_.size() == 0 && setup_.newton.norm != NewtonNorm::euclidean) {
+      norm_weights_ = unit_mass_diagonal(cells_);
+      if (rigid_) norm_weights_ = rigid_->weights_of(norm_weights_);
+    }
     NewtonExtras extras{.norm_weights = {norm_weights_.data(), static_cast<std::size_t>(norm_weights_.size())},
                         .on_iteration = setup_.on_iteration,
                         .must_be_minimum = !terms_.has_inertia,
@@ -247,6 +267,11 @@ class LaggedSolve {
       extras.gradient_of_step = VectorX::Zero(x.size());
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
       extras.step_to_start = std::move(step_to_start);
+      if (rigid_) {
+        const VectorX gradient = std::exchange(extras.gradient_of_step, VectorX::Zero(x.size()));
+        rigid_->map()->add_gradient(gradient, extras.gradient_of_step);
+        extras.step_to_start = rigid_->of_motion(extras.step_to_start);
+      }
     }
     if (cells_.has_curved()) {
       potential_.elastic()->refine_quadrature(x);
@@ -310,9 +335,8 @@ class LaggedSolve {
     };
     constexpr std::size_t kMostParts = 16;  ///< whose motions are solved for to all digits
     const bool is_corrected = least_motion_ && least_motion_->parts().size() <= kMostParts;
-    CorrectedSystem corrected(problem_.newton_system(), [&](ConstVectorView iterate, const DofMap& dofs) {
-      return least_motion_->rigid_motions(base_ + iterate, dofs);
-    });
+    CorrectedSystem corrected(problem_.newton_system(),
+                              [&](ConstVectorView iterate, const DofMap&) { return loose_motions(iterate); });
     NewtonSystem& in_use = is_corrected ? static_cast<NewtonSystem&>(corrected) : problem_.newton_system();
     NewtonOptions options = setup_.newton;
     if (loose_force_ > 0) {
@@ -320,7 +344,8 @@ class LaggedSolve {
       extras.must_be_minimum = false;
     }
     const auto solve = [&] {
-      return minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
+      return rigid_ ? minimize_by_coordinates(all, d, target, in_use, options, extras)
+                    : minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
     };
     NewtonSummary summary = solve();
     if (problem_.tie_ && ended_by == EndedBy::solver) {
@@ -377,12 +402,54 @@ class LaggedSolve {
       if (error > kSlow * before && round % 2 == 1) tie.stiffen(kFactor);
     }
   }
+  /// Minimises over the coordinates of d where there are rigid bodies; what `extras` calls sees increments.
+  NewtonSummary minimize_by_coordinates(const EnergySum& all, VectorX& d, VectorX target, NewtonSystem& system,
+                                        const NewtonOptions& options, NewtonExtras extras) {
+    const auto motion = [this](ConstVectorView of) { return rigid_->map()->motion(of); };
+    VectorX z = rigid_->of_motion(d);
+    for (int b = 0; b < rigid_->count(); ++b)
+      for (const int node : rigid_->nodes(b)) target.template segment<Dim>(Dim * node).setZero();
+    if (extras.after_step)
+      extras.after_step = [&, before = extras.after_step](const VectorX& iterate) { return before(motion(iterate)); };
+    extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
+      d = motion(z);
+      return !before || before(progress);
+    };
+    const EnergyByCoordinates<Dim> energy(std::make_shared<EnergyOfIncrement>(all, base_), *rigid_, base_);
+    NewtonSummary summary = minimize(energy, z, problem_.solve_dofs_, target, system, options, workspace_, extras);
+    d = motion(z);
+    for (VectorX* of : {&summary.blocked_from, &summary.blocked_step, &summary.failed_step})
+      if (of->size() > 0) *of = motion(*of);
+    return summary;
+  }
+  /// x where bodies that turn have come along arcs; rigid ones keep their shape there.
+  VectorX along_arcs(VectorX x) const {
+    if (!rigid_) return x;
+    const VectorX at = rigid_->coordinates_of(base_);
+    VectorX step = rigid_->of_motion(x - base_);
+    rigid_->bend(at, step);
+    return base_ + rigid_->map()->motion(step);
+  }
+  /// The motions of loose parts at an iterate, by coordinates; those of rigid bodies with held components are left out.
+  MatrixX loose_motions(ConstVectorView iterate) const {
+    if (!rigid_) return least_motion_->rigid_motions(base_ + iterate, dofs_);
+    MatrixX motions = least_motion_->rigid_motions(base_ + rigid_->map()->motion(iterate), dofs_);
+    for (Eigen::Index k = 0; k < motions.cols(); ++k) {
+      VectorX motion = motions.col(k);
+      for (int b = 0; b < rigid_->count(); ++b)
+        if (rigid_->is_held(b))
+          for (const int node : rigid_->nodes(b)) motion.template segment<Dim>(Dim * node).setZero();
+      motions.col(k) = rigid_->of_motion(motion);
+    }
+    return motions;
+  }
   /// Lets a solve from the increment d be primal-dual in friction.
   void follow_friction(const VectorX& d, NewtonExtras& extras) {
     lagged_.friction_of_surface->begin_solve(potential_.on_surface(base_ + d), problem_.rounds_ > 0);
     extras.on_iteration = [&, before = extras.on_iteration, weights = extras.norm_weights,
                            last = VectorX(d)](const NewtonProgress& progress) mutable {
-      const double step = Norms(dofs_, setup_.newton.norm, weights).of_step(d - last);
+      const VectorX change = rigid_ ? rigid_->of_motion(d - last) : VectorX(d - last);
+      const double step = Norms(problem_.solve_dofs_, setup_.newton.norm, weights).of_step(change);
       const double fraction = progress.step_norm > 0 ? std::min(1.0, step / progress.step_norm) : 1;
       lagged_.friction_of_surface->follow(potential_.on_surface(base_ + d), fraction);
       last = d;
@@ -392,6 +459,7 @@ class LaggedSolve {
   void follow_least_motion(const EnergySum& sum, const VectorX& d) {
     VectorX gradient = VectorX::Zero(d.size()), sizes = gradient;
     EnergyOfIncrement(sum, base_).add_gradient_and_sizes(d, gradient, sizes, workspace_);
+    if (rigid_) gradient = rigid_->without_reactions(std::move(gradient));
     least_motion_->follow(gradient, sizes, dofs_);
   }
   /// `summary` with the reason of a failure.
@@ -539,6 +607,7 @@ class LaggedSolve {
   Workspace& workspace_ = problem_.workspace_;
   const HeldDofs<Dim>& held_ = problem_.held_;
   const DofMap& dofs_ = problem_.dofs_;
+  const RigidCoordinates<Dim>* const rigid_ = problem_.rigid_;  ///< null without rigid bodies
   IncrementalPotential<Dim>& potential_ = problem_.potential_;
   const VectorX& base_ = problem_.base_;
   const std::shared_ptr<LeastMotion<Dim>>& least_motion_ = problem_.least_motion_;

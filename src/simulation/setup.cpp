@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "itr/setup.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -157,7 +158,10 @@ void check_materials(const Setup<Dim>& setup) {
     const double nu = material.poisson_ratio;
     require_positive(place + "/E", material.youngs_modulus);
     require(nu > -1 && nu < 0.5, place + "/nu", nu, "a number of (-1, 0.5)");
-    require_positive(place + "/rho", material.density);
+    if (rigid_body_of(material) && !setup.time.has_inertia())
+      require_not_negative(place + "/rho", material.density);  // a tool without mass
+    else
+      require_positive(place + "/rho", material.density);
     require_positive(place + "/deviator", material.deviator);
     double relaxed = 0;
     for (const PronyTerm& term : material.prony) {
@@ -239,6 +243,26 @@ void check_ties(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
+void check_rigid(const Setup<Dim>& setup) {
+  if (!has_rigid_bodies(setup.materials)) return;
+  const Mesh<Dim>& mesh = setup.mesh;
+  std::map<VertexId, const RigidBody*> owner;  // null: of bodies that deform
+  for (const CellId c : mesh.live_cells())
+    for (const VertexId v : mesh.cell(c)) {
+      const RigidBody* const body = rigid_body_of(setup.materials.at(mesh.body(c)));
+      if (owner.try_emplace(v, body).first->second != body)
+        refuse("/geometry/*/rigid", fmt::format("a rigid body that shares vertex {} with another body", v),
+               "one that shares none");
+    }
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0).held;
+  for (const auto& [v, body] : owner)
+    for (int c = 0; body && c < Dim; ++c)
+      if (held[Dim * v + c])
+        refuse("/boundary_conditions/dirichlet_boundary", "a condition on a rigid body",
+               "what stays of its motion in /geometry/*/rigid/held, or an obstacle in its place");
+}
+
+template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
   const CollisionProxy<Dim>& proxy = *setup.proxy;
@@ -284,6 +308,7 @@ void Setup<Dim>::validate() const {
   check_proxy(*this);
   check_cavities(*this);
   check_ties(*this);
+  check_rigid(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
   for (const auto& [name, list] :

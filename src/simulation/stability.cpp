@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/stability.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -26,6 +27,7 @@ constexpr double kNegligible = 0.02;  ///< of the largest part of the way that s
 /// Whether the body of a cell may buckle, as far as its stress tells.
 template <int Dim>
 bool is_compressed(const Material& material, const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
+  if (rigid_body_of(material)) return false;
   const auto element = element_of(mesh, c);
   const Mat<Dim> F = deformation_gradient<Dim>(element, x);
   const Mat<Dim> stress = elastic_stress<Dim>(F, elastic_moduli<Dim>(material, mesh.rest(mesh.cell(c)[0]))) * F.transpose();

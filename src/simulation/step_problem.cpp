@@ -12,6 +12,7 @@
 #include "energy/elastic/patched_volume.hpp"
 #include "energy/follower.hpp"
 #include "energy/mapped.hpp"
+#include "energy/rigid_load.hpp"
 #include "fem/unknowns.hpp"
 #include "geometry/quadratic_validity.hpp"
 #include "itr/core.hpp"
@@ -29,6 +30,7 @@ MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
       mortars(mortars_of(setup, mesh, cells)) {
   add_patches(setup.materials, cells);
   if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
+  if (has_rigid_bodies(setup.materials)) rigid = std::make_unique<const RigidCoordinates<Dim>>(setup.materials, cells);
 }
 
 template <int Dim>
@@ -74,6 +76,8 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       workspace_(scope_->workspace),
       held_(held_dofs(setup, mesh, t)),
       dofs_(DofMap::from_held(held_.held)),
+      rigid_(scope_->rigid.get()),
+      solve_dofs_(rigid_ ? DofMap::from_held(rigid_->held(held_.held)) : dofs_),
       potential_(terms_, cells_,
                  {.predictor = terms_.has_inertia ? TimeIntegrator(setup.time).predictor(history) : VectorX(),
                   .velocity_reference = TimeIntegrator(setup.time).velocity_reference(history)}),
@@ -85,6 +89,13 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   if (setup.follower.forces)
     terms_.follower = [this, &mesh, t](const VectorX& x) {
       return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
+    };
+  if (std::vector<int> loaded = loaded_rigid_bodies(); !loaded.empty())
+    terms_.follower = [this, t, loaded, program = terms_.follower](const VectorX& x) {
+      auto sum = std::make_shared<EnergySum>();
+      if (program) sum->add(program(x));
+      for (const int body : loaded) sum->add(rigid_load(body, x, t));
+      return sum;
     };
   if (setup.contact.enabled) {
     if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
@@ -120,7 +131,7 @@ void StepProblem<Dim>::add_ties(const History& history) {
 
 template <int Dim>
 void StepProblem<Dim>::reset_system() {
-  cache_.system.reset(dofs_, Dim, element_stencils(cells_));
+  cache_.system.reset(solve_dofs_, Dim, element_stencils(cells_));
   turn_ = ++cache_.served;
 }
 
@@ -139,6 +150,23 @@ NewtonSystem& StepProblem<Dim>::newton_system() {
   return *rank_ones_;
 }
 
+template <int Dim>
+std::vector<int> StepProblem<Dim>::loaded_rigid_bodies() const {
+  std::vector<int> loaded;
+  for (int b = 0; rigid_ && b < rigid_->count(); ++b)
+    if (rigid_->body(b).force || rigid_->body(b).moment) loaded.push_back(b);
+  return loaded;
+}
+
+template <int Dim>
+std::shared_ptr<const Energy> StepProblem<Dim>::rigid_load(int body, const VectorX& x, double t) const {
+  const RigidBody& loaded = rigid_->body(body);
+  const auto at_t = [t](const auto& load) { return load ? load(t) : Vec<3>(Vec<3>::Zero()); };
+  return std::make_shared<RigidLoad<Dim>>(rigid_->anchors(body), rigid_->coefficients(body),
+                                          Vec<Dim>(at_t(loaded.force).template head<Dim>()), at_t(loaded.moment), x,
+                                          terms_.scaling);
+}
+
 /// Sum of all entries of the mass matrix by its number of rows, obstacles' included; 1 where there is none [kg].
 template <int Dim>
 double StepProblem<Dim>::average_mass() const {
@@ -154,6 +182,7 @@ void StepProblem<Dim>::initialize_stiffness(const VectorX& x) {
   EnergySum others;
   potential_.add_to(others, lagged_, [](const Traits& term) { return !term.is_between_bodies && !term.needs_velocities; });
   others.add_gradient(x, gradient, workspace_);
+  if (rigid_) gradient = rigid_->without_reactions(std::move(gradient));
   const Eigen::Index bodies = x.size() - Dim * static_cast<Eigen::Index>(setup_.obstacles.rest.size());
   for (Eigen::Index o = 0; bodies + Dim * o < x.size(); ++o)
     gradient.template segment<Dim>(bodies + Dim * o) =
@@ -192,8 +221,13 @@ VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
   EnergySum sum = potential_.sum(lagged_);
   if (least_motion_) sum.add(least_motion_);
   PrescribedMotion none;
-  const auto assemble = [&](PsdProjection psd) { newton_system().assemble(sum, x, psd, dofs_, none, workspace_); };
-  const int unknowns = dofs_.num_unknowns;
+  std::shared_ptr<const Energy> energy = std::make_shared<EnergyOfIncrement>(sum, x);
+  if (rigid_) energy = std::make_shared<MappedEnergy<Dim>>(energy, rigid_->map());
+  const VectorX at = VectorX::Zero(x.size());
+  const auto assemble = [&](PsdProjection psd) {
+    newton_system().assemble(*energy, at, psd, solve_dofs_, none, workspace_);
+  };
+  const int unknowns = solve_dofs_.num_unknowns;
   VectorX by_unknown;
   double curvature = 0;
   if (unknowns == 0) return {};
@@ -205,7 +239,8 @@ VectorX StepProblem<Dim>::find_instability(const VectorX& x) {
     curvature = find_negative_curvature_by_products(newton_system(), assemble, unknowns, by_unknown).value_or(0);
   }
   if (!(curvature < 0)) return {};
-  return at_dofs(dofs_, by_unknown);
+  const VectorX direction = at_dofs(solve_dofs_, by_unknown);
+  return rigid_ ? rigid_->map()->motion(direction) : direction;
 }
 
 template <int Dim>
@@ -257,6 +292,10 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   forces.reaction = VectorX::Zero(bodies);
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] == kNone) forces.reaction[i] = -std::exchange(forces.residual[i], 0.0);
+  if (rigid_) {
+    forces.reaction -= rigid_->reactions(forces.residual);
+    forces.residual = rigid_->without_reactions(std::move(forces.residual));
+  }
   return forces;
 }
 
@@ -385,8 +424,9 @@ template <int Dim>
 double StepProblem<Dim>::energy_resolution() const {
   double stiffness = 0;
   for (const auto& element : cells_.elements)
-    stiffness += element.volume * cells_.turn(rest_barycenter<Dim>(cells_, element)) *
-                 setup_.materials.at(element.body).youngs_modulus;
+    if (!rigid_body_of(setup_.materials.at(element.body)))
+      stiffness += element.volume * cells_.turn(rest_barycenter<Dim>(cells_, element)) *
+                   setup_.materials.at(element.body).youngs_modulus;
   return kEnergyResolution * stiffness;
 }
 

@@ -12,6 +12,7 @@
 #include "itr/setup.hpp"
 #include "newton/newton.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/rigid_coordinates.hpp"
 #include "simulation/step_terms.hpp"
 #include "time/integrator.hpp"
 
@@ -28,10 +29,11 @@ struct MeshScope {
   std::uint64_t mesh_revision;
   ChordLevels chords;
   CellSet<Dim> cells;
-  ContactSurface<Dim> surface;       ///< empty without contact
-  double diagonal;                   ///< of the bodies at rest [m]
-  std::vector<Mortar<Dim>> mortars;  ///< one a tie
-  Workspace workspace;               ///< search trees of the surface
+  ContactSurface<Dim> surface;                         ///< empty without contact
+  std::unique_ptr<const RigidCoordinates<Dim>> rigid;  ///< null without rigid bodies
+  double diagonal;                                     ///< of the bodies at rest [m]
+  std::vector<Mortar<Dim>> mortars;                    ///< one a tie
+  Workspace workspace;                                 ///< search trees of the surface
 };
 
 /// Data that a simulation keeps from step to step, so that they are not made again: they change no result, only the time.
@@ -130,7 +132,7 @@ class StepProblem {
   Workspace& workspace() { return workspace_; }
   const BarrierStiffness& stiffness() const { return stiffness_; }
   QuadratureLevels quadrature_levels() const { return potential_.elastic()->quadrature_levels(); }
-  const DofMap& dofs() const { return dofs_; }
+  const DofMap& dofs() const { return solve_dofs_; }
   const CellSet<Dim>& cells() const { return cells_; }
   const CollisionSurface& surface() const { return surface_.surface; }
   double scaling() const { return terms_.scaling; }
@@ -155,6 +157,9 @@ class StepProblem {
   NewtonSystem& newton_system();
   VectorX momentum(const VectorX& v) const;
   double average_mass() const;
+  /// Finds rigid bodies with forces or moments, and makes the loads of one, lagged at x.
+  std::vector<int> loaded_rigid_bodies() const;
+  std::shared_ptr<const Energy> rigid_load(int body, const VectorX& x, double t) const;
 
   const StepSetup<Dim>& setup_;
   PotentialTerms<Dim> terms_;
@@ -164,6 +169,8 @@ class StepProblem {
   Workspace& workspace_;
   HeldDofs<Dim> held_;
   DofMap dofs_;
+  const RigidCoordinates<Dim>* rigid_;  ///< null without rigid bodies
+  DofMap solve_dofs_;                   ///< of the coordinates that a solve has; without rigid bodies the same
   IncrementalPotential<Dim> potential_;
   struct Solution {
     VectorX x, increment;

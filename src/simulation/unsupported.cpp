@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "unsupported.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <algorithm>
 
@@ -95,6 +96,23 @@ constexpr Check<Dim> kChecks[] = {
        return std::ranges::any_of(setup.materials, [&](const auto& e) {
          return !e.second.prony.empty() && !why_not_viscous(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim).empty();
        });
+     }},
+    {{"/geometry/*/rigid", "a rigid body in an axisymmetric scene"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && has_rigid_bodies(setup.materials); }},
+    {{"/geometry/*/rigid", "a rigid body with quadratic elements (discr_order 2 of its id)"},
+     [](const Setup<Dim>& setup, bool) {
+       return std::ranges::any_of(setup.order, [&](const auto& entry) {
+         const auto material = setup.materials.find(entry.first);
+         return entry.second == 2 && material != setup.materials.end() && rigid_body_of(material->second);
+       });
+     }},
+    {{"/output/error_bars", "error bars where there are rigid bodies"},
+     [](const Setup<Dim>& setup, bool) { return setup.fields.error_bars && has_rigid_bodies(setup.materials); }},
+    {{"/time/dt", "steps that choose their lengths where there are rigid bodies"},
+     [](const Setup<Dim>& setup, bool) { return setup.time.adaptive.enabled && has_rigid_bodies(setup.materials); }},
+    {{"/initial_conditions/acceleration", "\"consistent\" where there are rigid bodies"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.consistent_initial_acceleration && has_rigid_bodies(setup.materials);
      }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "watch.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -32,8 +33,9 @@ template <int Dim>
 double stiffness(const Setup<Dim>& setup) {
   double sum = 0;
   for (const CellId c : setup.mesh.live_cells())
-    sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
-           turn_at(setup.mesh, setup.mesh.barycenter(c));
+    if (!rigid_body_of(setup.materials.at(setup.mesh.body(c))))
+      sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
+             turn_at(setup.mesh, setup.mesh.barycenter(c));
   return sum;
 }
 

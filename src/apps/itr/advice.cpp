@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "advice.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -137,6 +138,7 @@ template <int Dim>
 std::pair<double, double> range_of_moduli(const Setup<Dim>& setup, const MeshFigures<Dim>& figures) {
   double softest = kInfinity, stiffest = 0;
   for (const auto& [body, of_body] : figures.bodies) {
+    if (rigid_body_of(setup.materials.at(body))) continue;
     softest = std::min(softest, setup.materials.at(body).youngs_modulus);
     stiffest = std::max(stiffest, setup.materials.at(body).youngs_modulus);
   }
@@ -157,6 +159,7 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
   const bool has_mass = setup.time.has_inertia() || setup.body_acceleration;
   for (const auto& [body, of_body] : figures.bodies) {
     const Material& material = setup.materials.at(body);
+    if (rigid_body_of(material)) continue;
     if (is_outside(material.youngs_modulus, kUsualModulus))
       found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", set_text(setup.names.bodies, body),
                                   setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
@@ -279,6 +282,7 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
   const double few_layers = setup.remesh.enabled ? 3 : 8;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
+    if (rigid_body_of(material)) continue;
     const std::string name = set_text(setup.names.bodies, body);
     const auto order = setup.order.find(body);
     if (order != setup.order.end() && order->second == 2) continue;
@@ -342,7 +346,8 @@ void find_loose_tolerance(const Simulation<Dim>& simulation, std::vector<std::st
   if (!setup.remesh.enabled || setup.remesh.sizing_field.enabled || setup.newton.norm != NewtonNorm::euclidean) return;
   double stiffness = 0;
   for (const auto& [body, size] : body_sizes(setup.mesh))
-    stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
+    if (!rigid_body_of(setup.materials.at(body)))
+      stiffness = std::max(stiffness, setup.materials.at(body).youngs_modulus * std::pow(size.mean_edge, Dim - 2));
   const double step = setup.newton.step_tolerance, worth = stiffness * step * step / 2;
   const double split = *setup.remesh.split.acceptance_tolerance;
   if (worth > kFraction * split)

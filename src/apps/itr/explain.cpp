@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "commands.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -124,7 +125,9 @@ class Explanation {
                  name == std::to_string(id) ? "" : " (" + name + ")", sum.cells,
                  order != setup_.order.end() && order->second == 2 ? "quadratic" : "linear", is_area ? "area" : "volume",
                  units.text(sum.volume, is_area ? "m^2" : "m^3"),
-                 sum_of(material) ? sum_of(material)->name() : kLaws[static_cast<std::size_t>(material.law)],
+                 rigid_body_of(material) ? "rigid, by a stiff term"
+                 : sum_of(material)      ? sum_of(material)->name()
+                                         : kLaws[static_cast<std::size_t>(material.law)],
                  units.text(material.youngs_modulus, "Pa"), material.poisson_ratio,
                  material.volume == VolumeForm::patches ? " (volume averaged over patches)" : "",
                  units.from_si(material.density, "kg/m^3"), units.name("kg/m^3"),

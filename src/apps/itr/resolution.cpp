@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "resolution.hpp"
+#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -85,6 +86,7 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   if (!first.is_any()) first = actions;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
+    if (rigid_body_of(material)) continue;
     const double length = size.diagonal, stress = actions.traction + material.density * actions.acceleration * length;
     const double of_load = stress / material.youngs_modulus;
     strain = std::max({strain, of_load, actions.displacement / length,

@@ -8,6 +8,7 @@
 #include <boost/container/small_vector.hpp>
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/rigid_body.hpp"
 #include "fem/chords.hpp"
 #include "prospect.hpp"
 #include "remesh/edits.hpp"
@@ -33,6 +34,9 @@ template <int Dim>
 bool RemeshQueries<Dim>::exists(const Candidate& candidate) const {
   const auto vertices = candidate.vertices();
   if (!std::ranges::all_of(vertices, [&](VertexId v) { return mesh_.is_vertex_alive(v); })) return false;
+  if (const auto cells = mesh_.cells_of(vertices[0]);
+      !cells.empty() && rigid_body_of(context_.materials.at(mesh_.body(cells[0]))))
+    return false;
   if (vertices.size() < 3) return vertices.size() == 1 || mesh_.are_joined(vertices[0], vertices[1]);
   return std::ranges::any_of(mesh_.cells_of(vertices[0]), [&](CellId c) {
     const auto& cell = mesh_.cell(c);
