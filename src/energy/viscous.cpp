@@ -380,7 +380,7 @@ typename ViscousStep<Dim>::End ViscousStep<Dim>::end(const Mesh<Dim>& mesh, Cons
 
 template <int Dim>
 std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
-                                                    ConstVectorView x, double t) {
+                                                    ConstVectorView x, double t, bool has_relaxed) {
   using Field = ViscousField<Dim>;
   if (std::ranges::all_of(materials, [](const auto& entry) { return entry.second.prony.empty(); })) return nullptr;
   std::vector<typename Field::Records> at_rest;
@@ -388,8 +388,8 @@ std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>& mesh, const
     const auto terms = static_cast<Eigen::Index>(materials.at(mesh.body(c)).prony.size());
     at_rest.push_back(Field::Records::Zero(terms == 0 ? 0 : Field::kOfLaw + Field::kOfTerm * terms, Dim + 1));
   }
-  const ViscousStep<Dim> at_once(std::make_shared<Field>(mesh, t, std::move(at_rest)), materials, 0);
-  return at_once.end(mesh, x, t).state;
+  const double dt = has_relaxed ? std::numeric_limits<double>::infinity() : 0;
+  return ViscousStep<Dim>(std::make_shared<Field>(mesh, t, std::move(at_rest)), materials, dt).end(mesh, x, t).state;
 }
 
 template <int Dim>
@@ -530,7 +530,7 @@ std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Record
   template class ViscousStep<Dim>;                                                                               \
   template class ViscousEnergy<Dim>;                                                                             \
   template std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&, \
-                                                               ConstVectorView, double);                         \
+                                                               ConstVectorView, double, bool);                   \
   template std::pair<Mat<3>, double> past_of_state<Dim>(                                                         \
       const ViscousField<Dim>::Records&, const std::array<double, Dim + 1>&, const Material&, const Mat<3>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

@@ -59,10 +59,10 @@ class ViscousField final : public ViscousHistory {
   mutable std::unique_ptr<Locator<Dim>> locator_;
 };
 
-/// The state of bodies that come to positions x at once.
+/// The state of bodies that come to positions x at once, or have long been there; null where none is viscoelastic.
 template <int Dim>
 std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
-                                                    ConstVectorView x, double t);
+                                                    ConstVectorView x, double t, bool has_relaxed = false);
 
 /// Weights of a term over a step of y = dt / tau in which stresses of the law change evenly: with its decay e = exp(-y) and
 /// the share a = (1 - e) / y of a change of stress that is left at the end.
