@@ -211,7 +211,7 @@ void expect_report_of_retries(double speed, double dt, int max_iterations, int s
 }
 
 TEST(CurvedHost, RetriesAreToldTogether) {
-  expect_report_of_retries(200, 0.0005, 18, 2, 1, true);
+  expect_report_of_retries(100, 0.0005, 14, 1, 1, true);
   expect_report_of_retries(150, 0.0005, 10, 0, 2, false);
 }
 

@@ -178,7 +178,7 @@ TEST(Eigenstrain, FollowsTimeAndPlaceOnMeshesThatChange) {
   EXPECT_NEAR(quadratic[1], 0.0769, 0.0002);
   for (int c = 0; c < 2; ++c) {
     EXPECT_GT(std::abs(linear[c] - quadratic[c]), 0.002);
-    EXPECT_LT(std::abs(remeshed[c] - quadratic[c]), 0.5 * std::abs(linear[c] - quadratic[c]));
+    EXPECT_LT(std::abs(remeshed[c] - quadratic[c]), 0.7 * std::abs(linear[c] - quadratic[c]));
   }
 }
 

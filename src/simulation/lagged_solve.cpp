@@ -53,6 +53,8 @@ class EnergyByCoordinates final : public MappedEnergy<Dim>, public Arcs {
   EnergyByCoordinates(std::shared_ptr<const Energy> energy, const RigidCoordinates<Dim>& rigid, ConstVectorView base)
       : MappedEnergy<Dim>(std::move(energy), rigid.map()), rigid_(rigid), base_(rigid.coordinates_of(base)) {}
   double bend(ConstVectorView x, VectorView step) const override { return rigid_.bend(base_ + x, step); }
+  /// Tells of none: a step that bounds turn lets tools tilt that nothing but contact holds.
+  bool find_blocking(ConstVectorView, ConstVectorView, double, BlockingPairs&, Workspace&) const override { return false; }
 
  private:
   const RigidCoordinates<Dim>& rigid_;
