@@ -25,7 +25,7 @@ Eigen::Matrix<double, 2, 6> turn_gradient() {
   return by_frame;
 }
 
-/// Forces by which a couple acts on vectors along the axes of a body, all of one length: f_k with sum f_k . (w x a_k) = M . w.
+/// Forces by which a couple acts on vectors along the axes of a body, all as long: f_k with sum f_k . (w x a_k) = M . w.
 Eigen::Matrix<double, 3, 4> forces_of_couple(const Vec<3>& moment, const Eigen::Matrix<double, 3, 4>& frame) {
   Eigen::Matrix<double, 3, 4> forces = Eigen::Matrix<double, 3, 4>::Zero();
   const double squared = frame.rightCols<3>().squaredNorm() / 3;

@@ -181,7 +181,7 @@ namespace {
 
 template <int Dim>
 std::string choose_stiffness(const Setup<Dim>& setup, ContactOptions& contact) {
-  const double stiffest = std::max(stiffest_modulus(setup), has_rigid_bodies(setup.materials) ? usual_modulus(setup) : 0);
+  const double deformed = stiffest_modulus(setup), stiffest = deformed > 0 ? deformed : usual_modulus(setup);
   contact.barrier_stiffness = barrier_stiffness_for(setup, contact, stiffest);
   const Units& units = setup.units;
   return fmt::format(

@@ -22,8 +22,8 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t);
 template <int Dim>
 std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t);
 
-/// The part that the past of viscoelastic bodies has in the step that ends at time t; null where there are none. In statics all
-/// that relaxes has done so.
+/// The part that the past of viscoelastic bodies has in the step that ends at time t; null where there are none. In statics
+/// all that relaxes has done so.
 template <int Dim>
 std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup, const History& history, double t);
 
