@@ -150,7 +150,8 @@ constexpr int kMostHalvings = 40, kMostDoublings = 12;
 constexpr double kVertexStepsBelow = 0.25;  ///< see try_vertex_steps
 constexpr double kBlockedBelow = 0.5;       ///< fraction of a step below which what is in the way is looked at
 constexpr int kLong = 20;                   ///< iterations from which on what blocks steps is kept
-constexpr double kWaitBelow = 0.1;  ///< a step blocked to less than this lets the bodies relax before held dofs go on
+constexpr double kWaitBelow =
+    0.1;  ///< a step blocked to less than this, or turned, lets the bodies relax before held dofs go on
 
 }  // namespace
 
@@ -167,7 +168,7 @@ bool Search::along(Step& step) {
   const auto* const arcs = dynamic_cast<const Arcs*>(&task_.energy);
   if (arcs && along_arcs(*arcs, step)) return true;
   const Ahead ahead = look_ahead(step);
-  if (advancing && ahead.fraction < kWaitBelow) held_.wait();
+  if (advancing && (ahead.fraction < kWaitBelow || ahead.is_turned)) held_.wait();
   if (ahead.fraction < kBlockedBelow) note_blocked(step);
   held_.raise_penalty(step, ahead.slope);
   double fraction = ahead.fraction;
@@ -221,7 +222,8 @@ Search::Ahead Search::look_ahead(Step& step) {
   const bool is_own_step = task_.options.indefinite == IndefiniteHessian::project;
   const bool may_project = !task_.extras.is_brief && is_own_step;
   const bool advancing = held_.is_advancing();
-  double fraction = at_.free_fraction(step.direction);
+  const double free = at_.free_fraction(step.direction);
+  double fraction = free;
   bool has_vertex_steps = false;
   {
     const ScopedTimer timer(task_.summary.ccd_seconds);
@@ -232,7 +234,7 @@ Search::Ahead Search::look_ahead(Step& step) {
       has_vertex_steps =
           task_.energy.get_vertex_steps(at_.x(), step.direction, scratch_.steps.resize(at_.x().size()), task_.workspace);
   }
-  return {fraction, at_.gradient().dot(step.direction), has_vertex_steps};
+  return {fraction, at_.gradient().dot(step.direction), has_vertex_steps, fraction != free};
 }
 
 void Search::note_blocked(const Step& step) {

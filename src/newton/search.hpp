@@ -28,6 +28,7 @@ class Search {
     double fraction;        ///< that is free
     double slope;           ///< of the energy
     bool has_vertex_steps;  ///< those of each vertex alone are known
+    bool is_turned = false;
   };
   bool along_arcs(const Arcs& arcs, Step& step);
   Ahead look_ahead(Step& step);
