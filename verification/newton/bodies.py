@@ -125,18 +125,31 @@ def bowl(scene):
     wall(scene, [(0 if k == 0 else np.sin(a), 1 - np.cos(a)) for k, a in enumerate(np.linspace(0, 0.6 * np.pi, 10))])
 
 
-# Name in the table: what fills its scene, and the dimension.
+def half_ball(scene):
+    """Half a ball pressed flat on a floor by its flat side: many pairs meet in each step."""
+    scene.gravity, scene.quasistatic, scene.dt, scene.steps, scene.kappa, scene.dhat = 0.0, True, 0.1, 10, 1e4, 2e-5
+    points, cells = ball_mesh(scene.dim, 32 if scene.dim == 2 else 12, 1.0, (0, 1.002, 0))
+    cells = cells[points[cells].mean(axis=1)[:, 1] < 1.002]
+    used, cells = np.unique(cells, return_inverse=True)
+    body = scene.body(points[used], cells.reshape(-1, scene.dim + 1))
+    scene.hold(body, 4, [0, "-0.2 * t", 0][:scene.dim])
+    wall(scene, [(0, 0), (3, 0)])
+
+
+# Name in the table: what fills its scene, the dimension, and the order of elements where it is not 1.
 BODIES = {
     "ball through a funnel 2D": (funnel, 2), "ball through a funnel 3D": (funnel, 3), "mats twisted 3D": (mats, 3),
     "cubes in a shrinking box 2D": (shrinking_box, 2), "cubes in a shrinking box 3D": (shrinking_box, 3),
     "nearly incompressible indentation 2D": (indentation, 2), "nearly incompressible indentation 3D": (indentation, 3),
     "creature in a bowl 2D": (bowl, 2), "creature in a bowl 3D": (bowl, 3),
+    "half a ball pressed flat 2D": (half_ball, 2), "half a ball pressed flat 2D, quadratic": (half_ball, 2, 2),
+    "half a ball pressed flat 3D": (half_ball, 3),
 }
 
 
 def build(name, folder):
     """Writes meshes and scene into a folder, and returns the scene's file."""
-    fill, dim = BODIES[name]
+    fill, dim, *order = BODIES[name]
     scene = Scene(pathlib.Path(folder), dim=dim)
     fill(scene)
     content = scene.content()
@@ -144,6 +157,8 @@ def build(name, folder):
     content["solver"]["nonlinear"] = {"x_delta": 1e-3, "grad_norm": 1e-8, "max_iterations": 3000}
     content["solver"]["contact"]["friction_iterations"] = 1
     content["output"] = {}
+    if order:
+        content["space"] = {"discr_order": order[0]}
     path = pathlib.Path(folder) / "scene.json"
     path.write_text(json.dumps(content, indent=1))
     return path

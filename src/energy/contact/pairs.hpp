@@ -6,6 +6,7 @@
 
 #include "energy/contact/surface.hpp"
 #include "geometry/bvh.hpp"
+#include "geometry/ccd.hpp"
 #include "geometry/distance.hpp"
 
 namespace itr {
@@ -41,6 +42,16 @@ bool motions_overlap(PairKind kind, const Positions<Dim>& p, const Positions<Dim
     box.include(q[k]);
   }
   return first.overlaps(second);
+}
+
+/// Fraction of the way from p to q that is free of contact, by conservative CCD.
+template <int Dim>
+double free_fraction(PairKind kind, const Positions<Dim>& p, const Positions<Dim>& q, const CcdOptions& options = {}) {
+  if (!motions_overlap<Dim>(kind, p, q)) return 1;
+  if constexpr (Dim == 2) return point_edge_ccd<2>(p[0], p[1], p[2], q[0], q[1], q[2], options);
+  if constexpr (Dim == 3)
+    return kind == PairKind::edge_edge ? edge_edge_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], options)
+                                       : point_triangle_ccd(p[0], p[1], p[2], p[3], q[0], q[1], q[2], q[3], options);
 }
 
 }  // namespace itr
