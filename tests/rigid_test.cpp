@@ -334,6 +334,30 @@ TEST_F(RigidScene, SliderPreloadsByItsForce) {
   }
 }
 
+TEST_F(RigidScene, PlateBondedToRubberHandsItsForceOn) {
+  write_box("block.obj", 6, 6, {0, 0}, {0.1, 0.1});
+  write_box("plate.obj", 5, 1, {-0.02, 0}, {0.14, 0.02});
+  for (const bool has_contact : {true, false}) {
+    json scene = press({{"force", {20, 50}}, {"held", {"rz"}}}, 0);
+    scene["geometry"][0]["surface_selection"].push_back({{"id", 3}, {"axis", "y"}, {"position", 0.0999}});
+    scene["geometry"][1]["surface_selection"] = {{{"id", 5}, {"axis", "-y"}, {"relative", false}, {"position", 0.10001}}};
+    scene["ties"] = {{{"a", {3}}, {"b", {5}}}};
+    scene["boundary_conditions"]["dirichlet_boundary"][0].erase("dimension");
+    scene["contact"]["enabled"] = has_contact;
+    Simulation<2> simulation(setup_of<2>(scene), registry_);
+    advance(simulation);
+    Vec<2> floor = Vec<2>::Zero(), plate = floor;
+    for (int v = 0; v < simulation.mesh().num_vertices(); ++v)
+      (v < 49 ? floor : plate) += simulation.forces().reaction.segment<2>(2 * v);
+    EXPECT_LE((floor + Vec<2>(20, 50)).norm(), 1e-6);
+    EXPECT_LE(plate.norm(), 1e-6);
+    EXPECT_NEAR(motion_of(simulation).turn, 0, 1e-12);
+    const VectorX u = simulation.positions();
+    const Vec<2> corner = u.segment<2>(2 * 42) - Vec<2>(0, 0.1), middle = motion_of(simulation).point - Vec<2>(0.05, 0.11);
+    EXPECT_LE((corner - middle).norm(), 1e-6 * middle.norm()) << "the top of the block goes with the plate";
+  }
+}
+
 TEST_F(RigidScene, ToolThatNothingStopsEndsWithTheReason) {
   write_box("block.obj", 2, 2, {0, 0}, {0.1, 0.1});
   write_box("plate.obj", 2, 1, {-0.02, 0}, {0.14, 0.02});

@@ -83,7 +83,8 @@ class MappedEnergy : public Energy {
                      Workspace& workspace) const override {
     if (!energy_->find_blocking(map_->positions(x), map_->motion(dx), fraction, blocking, workspace)) return false;
     for (BlockingPairs::Bound& bound : blocking.bounds) {
-      BlockingPairs::Bound mapped{.missing = bound.missing};
+      BlockingPairs::Bound mapped;
+      mapped.missing = bound.missing;
       for (std::size_t i = 0; i < bound.dofs.size(); ++i) {
         const int vertex = bound.dofs[i] / Dim, component = bound.dofs[i] % Dim;
         for (std::size_t k = 0; k < map_->sources(vertex).size(); ++k) {

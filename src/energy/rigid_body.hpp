@@ -5,7 +5,6 @@
 #include <array>
 #include <functional>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "core/check.hpp"
@@ -23,6 +22,12 @@ struct RigidBody final : OwnLaw {
   /// A couple, which does the work moment times turn [N m]; in 2D about z [N]. Empty: none.
   std::function<Vec<3>(double t)> moment{};
 
+  /// Whether anything of its motion is held.
+  bool is_held() const {
+    const auto any = [](const std::array<bool, 3>& held) { return held[0] || held[1] || held[2]; };
+    return any(held_position) || any(held_rotation);
+  }
+
   double density(const Eigen::Ref<const MatrixX>&) const override { return no_law(); }
   void stress(const Eigen::Ref<const MatrixX>&, Eigen::Ref<MatrixX>) const override { no_law(); }
   void hessian(const Eigen::Ref<const MatrixX>&, Eigen::Ref<MatrixX>) const override { no_law(); }
@@ -39,15 +44,12 @@ inline const RigidBody* rigid_body_of(const Material& material) {
   return dynamic_cast<const RigidBody*>(material.own.get());
 }
 
-/// The rigid bodies with the ids of their cells, in the order of the least of these.
-inline std::vector<std::pair<const RigidBody*, std::vector<int>>> rigid_bodies(const std::map<int, Material>& materials) {
-  std::vector<std::pair<const RigidBody*, std::vector<int>>> bodies;
-  for (const auto& [id, material] : materials) {
-    const RigidBody* const body = rigid_body_of(material);
-    if (!body) continue;
-    const auto known = std::find_if(bodies.begin(), bodies.end(), [&](const auto& entry) { return entry.first == body; });
-    (known == bodies.end() ? bodies.emplace_back(body, std::vector<int>()) : *known).second.push_back(id);
-  }
+/// The rigid bodies, in the order of the least of their ids.
+inline std::vector<const RigidBody*> rigid_bodies(const std::map<int, Material>& materials) {
+  std::vector<const RigidBody*> bodies;
+  for (const auto& [id, material] : materials)
+    if (const RigidBody* const body = rigid_body_of(material))
+      if (std::find(bodies.begin(), bodies.end(), body) == bodies.end()) bodies.push_back(body);
   return bodies;
 }
 inline bool has_rigid_bodies(const std::map<int, Material>& materials) {

@@ -110,7 +110,8 @@ double project_step(const StepOrigin& origin, Step& step, double fraction, bool 
   const ModelAlong along_first{gradient.dot(first), step.curvature};
   double least = along_first.change(fraction), free = fraction, best_fraction = fraction;
   VectorX ahead = first, correction = VectorX::Zero(dofs.num_unknowns);
-  BlockingPairs blocking{.takes_first = is_advancing};
+  BlockingPairs blocking;
+  blocking.takes_first = is_advancing;
   BoundedGaps gaps(dofs, system);
   for (int round = 0; round < kMostRounds; ++round) {
     if (!energy.find_blocking(x, ahead, std::min(1.0, kAhead * free), blocking, workspace)) break;
@@ -150,8 +151,7 @@ constexpr int kMostHalvings = 40, kMostDoublings = 12;
 constexpr double kVertexStepsBelow = 0.25;  ///< see try_vertex_steps
 constexpr double kBlockedBelow = 0.5;       ///< fraction of a step below which what is in the way is looked at
 constexpr int kLong = 20;                   ///< iterations from which on what blocks steps is kept
-constexpr double kWaitBelow =
-    0.1;  ///< a step blocked to less than this, or turned, lets the bodies relax before held dofs go on
+constexpr double kWaitBelow = 0.1;          ///< blocked to less, or turned: bodies relax before held dofs go on
 
 }  // namespace
 

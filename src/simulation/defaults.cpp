@@ -73,19 +73,26 @@ double largest_norm(const Function& f, const TimeOptions& time) {
 template <int Dim>
 double usual_modulus(const Setup<Dim>& setup) {
   constexpr double kStrain = 0.01;
+  struct Figures {
+    Eigen::AlignedBox<double, Dim> own{};
+    double mass = 0, speed = 0;
+  };
+  std::map<const RigidBody*, Figures> bodies;
+  for (const CellId c : setup.mesh.live_cells()) {
+    const Material& material = setup.materials.at(setup.mesh.body(c));
+    const RigidBody* const body = rigid_body_of(material);
+    if (!body) continue;
+    auto& [own, mass, speed] = bodies[body];
+    const Vec<Dim> X = setup.mesh.barycenter(c);
+    mass += material.density * setup.mesh.volume(c);
+    for (const VertexId v : setup.mesh.cell(c)) own.extend(setup.mesh.rest(v));
+    for (const auto& condition : setup.initial_velocity)
+      if (condition.body == setup.mesh.body(c)) speed = std::max(speed, condition.value(X, setup.time.t0).norm());
+  }
   auto box = rest_box(setup.mesh);
   double pressure = 0;
-  for (const auto& [body, ids] : rigid_bodies(setup.materials)) {
-    Eigen::AlignedBox<double, Dim> own;
-    double mass = 0, speed = 0;
-    for (const CellId c : setup.mesh.live_cells()) {
-      if (rigid_body_of(setup.materials.at(setup.mesh.body(c))) != body) continue;
-      const Vec<Dim> X = setup.mesh.barycenter(c);
-      mass += setup.materials.at(setup.mesh.body(c)).density * setup.mesh.volume(c);
-      for (const VertexId v : setup.mesh.cell(c)) own.extend(setup.mesh.rest(v));
-      for (const auto& condition : setup.initial_velocity)
-        if (condition.body == setup.mesh.body(c)) speed = std::max(speed, condition.value(X, setup.time.t0).norm());
-    }
+  for (auto& [body, figures] : bodies) {
+    auto& [own, mass, speed] = figures;
     const double size = own.diagonal().norm(), area = std::pow(size, Dim - 1);
     const double gravity =
         setup.body_acceleration ? setup.body_acceleration(Vec<Dim>(own.center()), setup.time.t0).norm() : 0;

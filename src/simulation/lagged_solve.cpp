@@ -16,9 +16,7 @@
 
 #include "core/timer.hpp"
 #include "diagnosis.hpp"
-#include "energy/arcs.hpp"
 #include "energy/least_motion.hpp"
-#include "energy/mapped.hpp"
 #include "energy/polyfem/lagged_regularization.hpp"
 #include "fem/hessian_sink.hpp"
 #include "flight_guard.hpp"
@@ -28,7 +26,9 @@
 #include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
 #include "newton/iterate.hpp"
+#include "simulation/rigid_solve.hpp"
 #include "simulation/step_problem.hpp"
+#include "simulation/tie_rounds.hpp"
 
 namespace itr {
 
@@ -45,22 +45,6 @@ constexpr int kLooseRounds = 4;                ///< at most: what goes on for lo
 constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
-/// The energy of an increment as a function of its coordinates.
-template <int Dim>
-class EnergyByCoordinates final : public MappedEnergy<Dim>, public Arcs {
- public:
-  /// `rigid` must outlive this; `base`: where increments begin.
-  EnergyByCoordinates(std::shared_ptr<const Energy> energy, const RigidCoordinates<Dim>& rigid, ConstVectorView base)
-      : MappedEnergy<Dim>(std::move(energy), rigid.map()), rigid_(rigid), base_(rigid.coordinates_of(base)) {}
-  double bend(ConstVectorView x, VectorView step) const override { return rigid_.bend(base_ + x, step); }
-  /// Tells of none: a step that bounds turn lets tools tilt that nothing but contact holds.
-  bool find_blocking(ConstVectorView, ConstVectorView, double, BlockingPairs&, Workspace&) const override { return false; }
-
- private:
-  const RigidCoordinates<Dim>& rigid_;
-  VectorX base_;
-};
-
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
 
 }  // namespace
@@ -76,7 +60,8 @@ class LaggedSolve {
     VectorX step_to_start;
     {
       const ScopedTimer timer(lagging_seconds);
-      const VectorX start = along_arcs(with_held_at_targets(expected.size() > 0 ? expected : x));
+      VectorX start = with_held_at_targets(expected.size() > 0 ? expected : x);
+      if (rigid_) start = by_coordinates().along_arcs(start);
       if (potential_.contact())
         potential_.contact()->predict_motion(surface_.positions(x), surface_.motion(start - x), workspace_);
       const bool is_first_step = std::isinf(stiffness_.largest);
@@ -269,11 +254,6 @@ class LaggedSolve {
       extras.gradient_of_step = VectorX::Zero(x.size());
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
       extras.step_to_start = std::move(step_to_start);
-      if (rigid_) {
-        const VectorX gradient = std::exchange(extras.gradient_of_step, VectorX::Zero(x.size()));
-        rigid_->map()->add_gradient(gradient, extras.gradient_of_step);
-        extras.step_to_start = rigid_->of_motion(extras.step_to_start);
-      }
     }
     if (cells_.has_curved()) {
       potential_.elastic()->refine_quadrature(x);
@@ -346,13 +326,13 @@ class LaggedSolve {
       extras.must_be_minimum = false;
     }
     const auto solve = [&] {
-      return rigid_ ? minimize_by_coordinates(all, d, target, in_use, options, extras)
+      return rigid_ ? by_coordinates().minimize(all, d, target, in_use, options, extras, workspace_)
                     : minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
     };
     NewtonSummary summary = solve();
     if (problem_.tie_ && ended_by == EndedBy::solver) {
       extras.step_to_start.resize(0);
-      close_ties(d, solve, summary);
+      close_ties<Dim>(*problem_.tie_, cells_, base_, d, solve, setup_.units, summary);
     }
     x = positions_at(d, target);
     if (summary.blocked_from.size() > 0) summary.blocked_from += base_;
@@ -380,70 +360,12 @@ class LaggedSolve {
       if (dofs_.unknown[i] == kNone && d[i] == target[i]) x[i] = held_.target[i];
     return x;
   }
-  /// Solves again with new multipliers until ties have no gaps, beside what solves leave of them.
-  template <typename Solve>
-  void close_ties(const VectorX& d, const Solve& solve, NewtonSummary& summary) {
-    constexpr double kTieTolerance = 1e-7;  // of the tractions
-    constexpr double kSlow = 0.1, kFactor = 10;
-    constexpr int kMostTieRounds = 20;
-    TieEnergy<Dim>& tie = *problem_.tie_;
-    double error = tie.error_at({base_, d});
-    for (int round = 0; summary.converged() && error > kTieTolerance; ++round) {
-      if (round == kMostTieRounds) {
-        summary.termination = Termination::lagging;
-        summary.message =
-            fmt::format("tied surfaces stay apart by {}: conditions may hold both sides in different places",
-                        setup_.units.text(tie.largest_gap(VectorX(base_ + d - rest_positions<Dim>(cells_))), "m", 3));
-        return;
-      }
-      tie.update({base_, d});
-      NewtonSummary next = solve();
-      next.add_effort(summary);
-      summary = std::move(next);
-      const double before = std::exchange(error, tie.error_at({base_, d}));
-      if (error > kSlow * before && round % 2 == 1) tie.stiffen(kFactor);
-    }
-  }
-  /// Minimises over the coordinates of d where there are rigid bodies; what `extras` calls sees increments.
-  NewtonSummary minimize_by_coordinates(const EnergySum& all, VectorX& d, VectorX target, NewtonSystem& system,
-                                        const NewtonOptions& options, NewtonExtras extras) {
-    const auto motion = [this](ConstVectorView of) { return rigid_->map()->motion(of); };
-    VectorX z = rigid_->of_motion(d);
-    for (int b = 0; b < rigid_->count(); ++b)
-      for (const int node : rigid_->nodes(b)) target.template segment<Dim>(Dim * node).setZero();
-    if (extras.after_step)
-      extras.after_step = [&, before = extras.after_step](const VectorX& iterate) { return before(motion(iterate)); };
-    extras.on_iteration = [&, before = extras.on_iteration](const NewtonProgress& progress) {
-      d = motion(z);
-      return !before || before(progress);
-    };
-    const EnergyByCoordinates<Dim> energy(std::make_shared<EnergyOfIncrement>(all, base_), *rigid_, base_);
-    NewtonSummary summary = minimize(energy, z, problem_.solve_dofs_, target, system, options, workspace_, extras);
-    d = motion(z);
-    for (VectorX* of : {&summary.blocked_from, &summary.blocked_step, &summary.failed_step})
-      if (of->size() > 0) *of = motion(*of);
-    return summary;
-  }
-  /// x where bodies that turn have come along arcs; rigid ones keep their shape there.
-  VectorX along_arcs(VectorX x) const {
-    if (!rigid_) return x;
-    const VectorX at = rigid_->coordinates_of(base_);
-    VectorX step = rigid_->of_motion(x - base_);
-    rigid_->bend(at, step);
-    return base_ + rigid_->map()->motion(step);
-  }
-  /// The motions of loose parts at an iterate, by coordinates; those of rigid bodies with held components are left out.
+  /// Where there are rigid bodies.
+  RigidSolve<Dim> by_coordinates() const { return {*rigid_, base_, problem_.solve_dofs_}; }
+  /// The motions of loose parts at an iterate, by coordinates.
   MatrixX loose_motions(ConstVectorView iterate) const {
     if (!rigid_) return least_motion_->rigid_motions(base_ + iterate, dofs_);
-    MatrixX motions = least_motion_->rigid_motions(base_ + rigid_->map()->motion(iterate), dofs_);
-    for (Eigen::Index k = 0; k < motions.cols(); ++k) {
-      VectorX motion = motions.col(k);
-      for (int b = 0; b < rigid_->count(); ++b)
-        if (rigid_->is_held(b))
-          for (const int node : rigid_->nodes(b)) motion.template segment<Dim>(Dim * node).setZero();
-      motions.col(k) = rigid_->of_motion(motion);
-    }
-    return motions;
+    return by_coordinates().free_motions(least_motion_->rigid_motions(base_ + rigid_->map()->motion(iterate), dofs_));
   }
   /// Lets a solve from the increment d be primal-dual in friction.
   void follow_friction(const VectorX& d, NewtonExtras& extras) {

@@ -5,20 +5,26 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace itr {
 
 namespace {
 
-/// Nodes of the cells of these bodies, ascending.
+/// By rigid body, the nodes of its cells, ascending.
 template <int Dim>
-std::vector<int> nodes_of_bodies(const CellSet<Dim>& cells, const std::vector<int>& bodies) {
-  std::vector<int> nodes;
+std::map<const RigidBody*, std::vector<int>> nodes_of_bodies(const std::map<int, Material>& materials,
+                                                             const CellSet<Dim>& cells) {
+  std::map<int, const RigidBody*> rigid;
+  for (const auto& [id, material] : materials) rigid[id] = rigid_body_of(material);
+  std::map<const RigidBody*, std::vector<int>> nodes;
   for (const auto& element : cells.elements)
-    if (std::ranges::find(bodies, element.body) != bodies.end())
-      nodes.insert(nodes.end(), element.vertices.begin(), element.vertices.end());
-  std::sort(nodes.begin(), nodes.end());
-  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    if (const RigidBody* const body = rigid.at(element.body))
+      nodes[body].insert(nodes[body].end(), element.vertices.begin(), element.vertices.end());
+  for (auto& [body, of] : nodes) {
+    std::sort(of.begin(), of.end());
+    of.erase(std::unique(of.begin(), of.end()), of.end());
+  }
   return nodes;
 }
 
@@ -70,15 +76,10 @@ Eigen::Array<bool, Dim, Dim + 1> RigidCoordinates<Dim>::held_of(const RigidBody&
 }
 
 template <int Dim>
-typename RigidCoordinates<Dim>::Body RigidCoordinates<Dim>::make(const RigidBody& body, const std::vector<int>& ids,
+typename RigidCoordinates<Dim>::Body RigidCoordinates<Dim>::make(const RigidBody& body, std::vector<int> nodes,
                                                                  const CellSet<Dim>& cells) {
-  Body made{.rigid = &body,
-            .nodes = nodes_of_bodies(cells, ids),
-            .W = {},
-            .anchors = {},
-            .inverse = {},
-            .size = 0,
-            .held = held_of(body)};
+  Body made{
+      .rigid = &body, .nodes = std::move(nodes), .W = {}, .anchors = {}, .inverse = {}, .size = 0, .held = held_of(body)};
   Eigen::AlignedBox<double, Dim> box;
   for (const int v : made.nodes) box.extend(cells.rest[v]);
   made.size = box.diagonal().norm();
@@ -97,21 +98,22 @@ typename RigidCoordinates<Dim>::Body RigidCoordinates<Dim>::make(const RigidBody
 }
 
 template <int Dim>
-RigidCoordinates<Dim>::RigidCoordinates(const std::map<int, Material>& materials, const CellSet<Dim>& cells)
-    : is_rigid_(cells.rest.size(), 0) {
+RigidCoordinates<Dim>::RigidCoordinates(const std::map<int, Material>& materials, const CellSet<Dim>& cells) {
   const int n = static_cast<int>(cells.rest.size());
+  std::vector<char> is_rigid(cells.rest.size(), 0);  // by node
+  auto nodes = nodes_of_bodies(materials, cells);
   std::vector<Eigen::Triplet<double>> entries;
-  for (const auto& [body, ids] : rigid_bodies(materials)) {
-    bodies_.push_back(make(*body, ids, cells));
+  for (const RigidBody* const body : rigid_bodies(materials)) {
+    bodies_.push_back(make(*body, std::move(nodes[body]), cells));
     const Body& made = bodies_.back();
     for (std::size_t i = 0; i < made.nodes.size(); ++i) {
-      is_rigid_[made.nodes[i]] = 1;
+      is_rigid[made.nodes[i]] = 1;
       for (int k = 0; k <= Dim; ++k)
         entries.emplace_back(made.nodes[i], made.nodes[k], made.W(static_cast<Eigen::Index>(i), k));
     }
   }
   for (int v = 0; v < n; ++v)
-    if (!is_rigid_[v]) entries.emplace_back(v, v, 1);
+    if (!is_rigid[v]) entries.emplace_back(v, v, 1);
   typename VertexMap<Dim>::Weights weights(n, n);
   weights.setFromTriplets(entries.begin(), entries.end());
   map_ = std::make_shared<VertexMap<Dim>>(weights, VectorX::Zero(Dim * n));

@@ -46,7 +46,6 @@ class RigidCoordinates {
   /// Nodes that a body's frame follows from, of which it is `coefficients` times the positions, as columns.
   const std::array<int, Dim + 1>& anchors(int body) const { return bodies_[body].anchors; }
   const Mat<Dim + 1>& coefficients(int body) const { return bodies_[body].inverse; }
-  bool is_held(int body) const { return bodies_[body].held.any(); }
   double size(int body) const { return bodies_[body].size; }  ///< [m]
   const std::vector<int>& nodes(int body) const { return bodies_[body].nodes; }
   /// The farthest that a body's node is from where its frame has it, by its size.
@@ -66,12 +65,11 @@ class RigidCoordinates {
     double size;                                       ///< [m]
     Eigen::Array<bool, Dim, Dim + 1> held;             ///< of the frame
   };
-  static Body make(const RigidBody& body, const std::vector<int>& ids, const CellSet<Dim>& cells);
+  static Body make(const RigidBody& body, std::vector<int> nodes, const CellSet<Dim>& cells);
   static Eigen::Array<bool, Dim, Dim + 1> held_of(const RigidBody& body);
   Frame by_frame(const Body& body, ConstVectorView gradient) const;
 
   std::vector<Body> bodies_;
-  std::vector<char> is_rigid_;  ///< by node
   std::shared_ptr<const VertexMap<Dim>> map_;
 };
 

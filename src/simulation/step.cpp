@@ -4,26 +4,27 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/check.hpp"
-#include "core/process.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
 #include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
+#include "simulation/effort_clock.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/stability.hpp"
 #include "simulation/step_terms.hpp"
+#include "simulation/straightening.hpp"
 
 namespace itr {
 
@@ -31,13 +32,6 @@ namespace {
 
 constexpr int kManyIterations = 100;    ///< of a solve, from which on the reason is told
 constexpr double kPoorResidual = 1e-6;  ///< of a linear solve, relative: a hundred times what Newton asks for
-
-void add_solves(const linear::SolveCounts& from, const linear::SolveCounts& to, StepReport& report) {
-  report.linear_solves += to.solves - from.solves;
-  report.factorizations += to.factorizations - from.factorizations;
-  report.reused_factors += to.reused - from.reused;
-  report.linear_iterations += to.iterations - from.iterations;
-}
 
 void add_seconds(const NewtonSummary& summary, StepSeconds& seconds) {
   seconds.assembly += summary.assembly_seconds;
@@ -58,47 +52,6 @@ std::string find_violation(const StepSetup<Dim>& setup, const State<Dim>& state,
     violation = find_violation(setup, state.mesh, state.history.x[age], state.chords, age);
   return violation;
 }
-
-/// Curved cells where det F is small somewhere, and those that share a vertex with one. Where there are none, all cells of a
-/// mesh with curved edges: those may have stopped the linear cells beside them.
-template <int Dim>
-std::vector<CellId> find_nearly_inverted(const State<Dim>& state, const VectorX& x) {
-  constexpr double kSmall = 0.1, kTolerance = 0.1;
-  const CellSet<Dim> cells = whole_mesh(state.mesh, {});
-  std::vector<CellId> found;
-  for (const auto& element : cells.curved()) {
-    const double least = min_jacobian_bound<Dim>(at_all_nodes<Dim>(element, x), kTolerance);
-    if (least * element.inverse_edges.determinant() >= kSmall) continue;
-    for (const VertexId v : element.vertices) {
-      const auto around = state.mesh.cells_of(v);
-      found.insert(found.end(), around.begin(), around.end());
-    }
-  }
-  if (found.empty() && cells.has_curved()) {
-    found.resize(state.mesh.cell_slots());
-    std::iota(found.begin(), found.end(), 0);
-  }
-  std::sort(found.begin(), found.end());
-  found.erase(std::unique(found.begin(), found.end()), found.end());
-  return found;
-}
-
-/// The time and the linear solves since it was made.
-class EffortClock {
- public:
-  explicit EffortClock(const linear::ReusingSolver& solver) : solver_(solver) {}
-
-  void tell(StepReport& report) const {
-    add_solves(solves_before_, solver_.counts(), report);
-    report.seconds.total = seconds_now() - start_;
-    report.processor_seconds = processor_seconds_now() - processor_start_;
-  }
-
- private:
-  const linear::ReusingSolver& solver_;
-  linear::SolveCounts solves_before_ = solver_.counts();
-  double start_ = seconds_now(), processor_start_ = processor_seconds_now();
-};
 
 /// A step by one integrator from one state.
 template <int Dim>
@@ -491,38 +444,6 @@ class StepSolver {
   std::optional<Solution> first_;  ///< while remeshing may still be taken back
   EffortClock clock_{tools_.solver};
 };
-
-/// The state that attempts start from, where that is not the one before the step.
-template <int Dim>
-struct StartOfStep {
-  Straightening straightening = Straightening::none;
-  State<Dim> state;
-  VectorX x;
-  StepReport effort;
-  std::optional<MeshRenumbering> renumbering;  ///< empty: no edge could become straight
-};
-
-/// Quadratic functions may oscillate where a shock or a fold is finer than the cells: linear ones go on.
-template <int Dim>
-StartOfStep<Dim> straighten(const StepTools<Dim>& tools, Straightening where, const StepFailure& failure,
-                            const State<Dim>& before) {
-  constexpr double kLeastVolume = 0.2;  // see straighten_cells
-  std::vector<CellId> cells = failure.nearly_inverted;
-  if (where != Straightening::around_failure) {
-    cells.resize(before.mesh.cell_slots());
-    std::iota(cells.begin(), cells.end(), 0);
-  }
-  StartOfStep<Dim> from;
-  from.straightening = where;
-  const EffortClock clock(tools.solver);
-  from.renumbering = straighten_and_project<Dim>(tools, cells, where == Straightening::at_any_volume ? 0 : kLeastVolume,
-                                                 before, from.state, from.x, from.effort);
-  clock.tell(from.effort);
-  if (from.renumbering)
-    tools.logger.warning(fmt::format("step {}: taken again with {} curved edges made straight: {}", before.step + 1,
-                                     before.mesh.num_curved() - from.state.mesh.num_curved(), failure.reason));
-  return from;
-}
 
 /// Says that the step is taken by `next`. Straightening and cuts say so themselves: they tell more.
 void tell(const Attempt& next, const StepFailure& failure, int step, const Logger& logger) {

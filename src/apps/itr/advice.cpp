@@ -228,6 +228,9 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     for (int c = 0; c < Dim; ++c)
       if (mesh.is_vertex_alive(v) && held[Dim * v + c]) fixed.insert(part[v]);
+  for (const CellId c : mesh.live_cells())
+    if (const RigidBody* const rigid = rigid_body_of(setup.materials.at(mesh.body(c))); rigid && rigid->is_held())
+      fixed.insert(part[mesh.cell(c)[0]]);
   for (const CellId c : mesh.live_cells()) {
     if (fixed.contains(part[mesh.cell(c)[0]])) continue;
     loose.insert(part[mesh.cell(c)[0]]);
