@@ -6,6 +6,7 @@
 #include <string>
 
 #include "advance.hpp"
+#include "energy/rigid_body.hpp"
 #include "itr/itr.hpp"
 #include "rings.hpp"
 #include "simulation/overlap.hpp"
@@ -138,7 +139,7 @@ TEST(Overlap, KeepsRestShapesAndSharesByStiffness) {
   EXPECT_GT(simulation.interference_energy(), 0);
 }
 
-/// Held at both ends, so that energy stays stored: nothing moves from there on.
+/// Held at both ends, so that energy stays stored: nothing moves from there on. Viscoelastic bodies have relaxed there.
 TEST(Overlap, DynamicRunsBeginAtRestAndStayThere) {
   itr::Setup<2> setup = blocks<2>({{{0, 0}, {1, 1}, 3}, {{0, 0.99}, {1, 2}, 4}});
   for (const FacetId f : setup.mesh.live_facets()) {
@@ -146,16 +147,18 @@ TEST(Overlap, DynamicRunsBeginAtRestAndStayThere) {
     if (y + z < 1e-9 || y + z > 4 - 1e-9) setup.mesh.set_facet_tag(f, 1);
   }
   setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }}};
-  for (const Integrator integrator : {Integrator::implicit_euler, Integrator::newmark, Integrator::bdf}) {
-    setup.time.integrator = integrator;
-    linear::Registry registry;
-    Simulation<2> simulation(setup, registry);
-    EXPECT_GT(simulation.interference_energy(), 10);
-    const VectorX start = simulation.positions();
-    while (!simulation.finished()) advance(simulation);
-    EXPECT_LE((simulation.positions() - start).cwiseAbs().maxCoeff(), 1e-8);
-    EXPECT_LE(largest_speed(simulation), 1e-5);
-  }
+  for (const bool is_viscous : {false, true})
+    for (const Integrator integrator : {Integrator::implicit_euler, Integrator::newmark, Integrator::bdf}) {
+      setup.time.integrator = integrator;
+      if (is_viscous) setup.materials[1].prony = {{0.5, 2e-3}};
+      linear::Registry registry;
+      Simulation<2> simulation(setup, registry);
+      EXPECT_GT(simulation.interference_energy(), 10);
+      const VectorX start = simulation.positions();
+      while (!simulation.finished()) advance(simulation);
+      EXPECT_LE((simulation.positions() - start).cwiseAbs().maxCoeff(), 1e-8);
+      EXPECT_LE(largest_speed(simulation), 1e-5);
+    }
 }
 
 /// Blocks that touch exactly, with nodes in common places or not, on a ground that they touch: apart by less than d-hat.
@@ -174,6 +177,54 @@ TEST(Overlap, TouchingBodiesBeginApart) {
       EXPECT_LE((vertex_of<2>(start, v) - simulation.mesh().rest(v)).norm(), 3 * dhat);
     while (!simulation.finished()) advance(simulation);
     EXPECT_LE(largest_speed(simulation), 1e-9);
+  }
+}
+
+/// A block that nothing holds, on one that it touches, gives way to a third that overlaps both: it stores nothing.
+TEST(Overlap, FreeBodiesGiveWay) {
+  const auto stored_by = [](const std::vector<Block<2>>& list) {
+    itr::Setup<2> setup = blocks<2>(list);
+    for (const FacetId f : setup.mesh.live_facets()) {
+      const Vec<2> middle = (setup.mesh.rest(setup.mesh.facet(f)[0]) + setup.mesh.rest(setup.mesh.facet(f)[1])) / 2;
+      if (middle[0] > 2 - 1e-9 || (middle[0] < 1 && middle[1] < 1e-9)) setup.mesh.set_facet_tag(f, 1);
+    }
+    setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }}};
+    setup.time = {.is_static = true, .dt = 1, .steps = 1};
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    EXPECT_GT(advance(simulation).report.min_distance, 0);
+    return simulation.interference_energy();
+  };
+  const Block<2> held{{0, 0}, {1, 1}, 4}, wall{{0.995, -0.5}, {2, 2.5}, 7}, loose{{0, 1}, {1, 2}, 5};
+  const double without = stored_by({held, wall});
+  EXPECT_NEAR(stored_by({held, wall, loose}), without, 1e-3 * without);
+}
+
+/// A rigid block that is held squeezes a soft one against the axis; one that may slide moves away from it.
+TEST(Overlap, RigidBodiesStayRigidAndHeld) {
+  for (const bool is_held : {true, false}) {
+    itr::Setup<2> setup = blocks<2>({{{0, 0}, {1, 1}, 4}, {{0.99, -0.5}, {2, 1.5}, 3}});
+    for (const FacetId f : setup.mesh.live_facets())
+      if (std::ranges::all_of(setup.mesh.facet(f), [&](VertexId v) { return setup.mesh.rest(v)[0] == 0; }))
+        setup.mesh.set_facet_tag(f, 1);
+    setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }}};
+    const auto rigid = std::make_shared<RigidBody>();
+    rigid->held_position = {is_held, true, false};
+    rigid->held_rotation = {false, false, true};
+    setup.materials[2].own = rigid;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    const double dhat = simulation.setup().contact.dhat;
+    double farthest = 0;
+    const auto& mesh = simulation.mesh();
+    for (VertexId v = 0; v < mesh.num_vertices(); ++v) {
+      const Vec<2> x = vertex_of<2>(simulation.positions(), v), u = x - mesh.rest(v);
+      if (mesh.body(mesh.cells_of(v)[0]) == 1)
+        farthest = std::max(farthest, x[0]);
+      else
+        EXPECT_LE((u - Vec<2>(is_held ? 0 : 0.01, 0)).norm(), is_held ? 1e-12 : 2 * dhat);
+    }
+    EXPECT_NEAR(farthest, is_held ? 0.99 : 1, dhat);
   }
 }
 

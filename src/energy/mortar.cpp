@@ -131,13 +131,17 @@ class Sides {
 
  private:
   const typename CellSet<Dim>::Element* element_of(std::array<int, Dim> facet) {
-    if (by_facet_.empty())
+    if (by_facet_.empty()) {
+      std::vector<char> is_on_boundary(cells_.rest.size(), 0);
+      for (const auto& of_boundary : cells_.facets)
+        for (const int v : of_boundary.vertices) is_on_boundary[v] = 1;
       for (const auto& element : cells_.elements)
-        for (int left_out = 0; left_out <= Dim; ++left_out) {
-          std::array<int, Dim> vertices;
-          for (int k = 0; k < Dim; ++k) vertices[k] = element.vertices[(left_out + 1 + k) % (Dim + 1)];
-          by_facet_.emplace(ascending(vertices), &element);
+        for (int k = 0; k <= Dim; ++k) {
+          const auto vertices = opposite_facet<Dim>(element.vertices, k);
+          if (std::ranges::all_of(vertices, [&](int v) { return is_on_boundary[v] != 0; }))
+            by_facet_.emplace(ascending(vertices), &element);
         }
+    }
     return by_facet_.at(ascending(facet));
   }
 

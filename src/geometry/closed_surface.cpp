@@ -134,11 +134,12 @@ std::vector<int> ClosedSurface<Dim>::nested() const {
 /// Looks behind points of each facet: where the surface winds around these twice, another body is there, too. How far that
 /// goes on is the depth.
 template <int Dim>
-Overlap<Dim> ClosedSurface<Dim>::find_overlap(const ClosedFaces& closed) const {
+Overlap<Dim> ClosedSurface<Dim>::find_overlap(const ClosedFaces& closed, const std::vector<char>& left_out) const {
   constexpr int kMostDoublings = 64, kHalvings = 12;
   constexpr double kToCenter = 0.25;
   Overlap<Dim> deepest;
   for (const Facet& f : facets_) {
+    if (!left_out.empty() && std::ranges::any_of(f, [&](int v) { return left_out[v] != 0; })) continue;
     std::array<Vec<Dim>, Dim> corners;
     Vec<Dim> center = Vec<Dim>::Zero();
     for (int k = 0; k < Dim; ++k) center += (corners[k] = x_[f[k]]) / Dim;

@@ -39,8 +39,8 @@ class ClosedSurface {
   /// facets with an orientation that do not cross each other.
   std::vector<int> nested() const;
   /// The deepest overlap of bodies, at points of each facet: infinite where the facet has no closed vertex. Less than 1e3
-  /// `closed.coincident` is none. For facets that are oriented outward.
-  Overlap<Dim> find_overlap(const ClosedFaces& closed) const;
+  /// `closed.coincident` is none. For facets that are oriented outward; those with a vertex that is `left_out` do not count.
+  Overlap<Dim> find_overlap(const ClosedFaces& closed, const std::vector<char>& left_out = {}) const;
 
  private:
   std::vector<Vec<Dim>> x_;

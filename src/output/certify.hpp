@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Checks each stored frame with exact predicates. Every cell has a positive volume, at rest and deformed. Surfaces share no
 // point except common vertices and edges. No obstacle, points and edges included, is inside a body or a closed proxy, and no
-// body is inside another. Faces that coincide at rest and have not been apart by d-hat since may overlap by d-hat. Motion
-// between two frames is not checked; the steps' own collision detection answers for it.
+// body is inside another. Faces that coincide at rest and have not been apart by d-hat since may overlap by d-hat, and
+// those that ties bond by their reach. Motion between two frames is not checked; the steps' own collision detection answers
+// for it.
 #pragma once
 
 #include <filesystem>
@@ -26,7 +27,7 @@ struct Certificate {
   /// How far curved edges of the surface leave the chords through their nodes, and how far where something else is nearer to
   /// these chords than that, in the frames' units. The curves themselves are checked.
   double overhang = 0, blocked_overhang = 0;
-  double overlap = 0;  ///< of faces that coincide at rest and have not been apart by d-hat since, at most [m]
+  double overlap = 0;  ///< of closed faces: tied, or coincident at rest and not apart by d-hat since; at most [m]
   Units units{};       ///< of the frames
   bool passed() const { return violations.empty() && frames > 0; }
 };

@@ -156,7 +156,19 @@ void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const Ve
 template <int Dim>
 Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords) {
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords);
-  return body_boundary(mesh, x, chords).find_overlap(contact.surface.closed);
+  std::vector<char> left_out;
+  if (!setup.ties.empty()) {
+    const std::vector<char> tied = tied_vertices(setup, mesh);
+    const auto is_tied = [&](int node) {
+      bool is = false;
+      if (node < mesh.num_nodes()) for_each_vertex_of_node(mesh, node, [&](VertexId v) { is = is || tied[v]; });
+      return is;
+    };
+    left_out.resize(contact.surface.area.size());
+    for (int i = 0; i < static_cast<int>(left_out.size()); ++i)
+      left_out[i] = contact.map ? std::ranges::any_of(contact.map->sources(i), is_tied) : is_tied(i);
+  }
+  return body_boundary(mesh, x, chords).find_overlap(contact.surface.closed, left_out);
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                       \

@@ -31,7 +31,7 @@ bool has_only_tied_faces(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 template <int Dim>
 void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh);
 
-/// How bodies overlap at x, the present positions.
+/// How bodies overlap at x, the present positions, but for facets with vertices that ties may bond.
 template <int Dim>
 Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords);
 

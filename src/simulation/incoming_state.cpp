@@ -43,7 +43,7 @@ void refuse_enclosed(const Setup<Dim>& setup, const State<Dim>& state) {
   const ClosedSurface<Dim> boundary = body_boundary(state.mesh, x, state.chords);
   if (!has_closed_faces(state.mesh)) {
     for (const int v : boundary.nested()) refuse("a body", x.segment<Dim>(Dim * v));
-  } else if (const auto overlap = find_overlap(setup, state.mesh, x, state.chords);
+  } else if (const auto overlap = boundary.find_overlap(contact_surface(setup, state.mesh, state.chords).surface.closed);
              overlap.depth > setup.contact.reach_of_closed()) {
     refuse("a body", overlap.place);
   }

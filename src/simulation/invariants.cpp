@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "fem/inverted.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
 
 namespace itr {
@@ -45,6 +46,10 @@ std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   const bool has_closed = !contact.surface.closed.empty();
   const auto overlap = has_closed ? body_boundary(mesh, x, chords).find_overlap(contact.surface.closed) : Overlap<Dim>{};
   if (overlap.depth > dhat && std::isfinite(overlap.depth)) return pressed_faces(overlap, dhat, setup.units);
+  if (!setup.ties.empty() && !has_only_tied_faces(setup, mesh))  // which may not reach as far as ties
+    if (const auto untied = find_overlap(setup, mesh, x, chords);
+        untied.depth > setup.contact.dhat && std::isfinite(untied.depth))
+      return pressed_faces(untied, setup.contact.dhat, setup.units);
   const VectorX y = contact.positions(x);
   if (const auto pairs = find_intersections<Dim>(contact.surface, y, 1); !pairs.empty()) {
     if (!is_closed_pair<Dim>(contact.surface, pairs[0])) return "surfaces intersect";

@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
@@ -16,10 +14,12 @@
 #include "energy/elastic/elastic.hpp"
 #include "energy/mapped.hpp"
 #include "energy/polyfem/lagged_regularization.hpp"
-#include "geometry/measures.hpp"
+#include "energy/rigid_body.hpp"
 #include "itr/core.hpp"
 #include "newton/newton.hpp"
 #include "simulation/named.hpp"
+#include "simulation/rigid_coordinates.hpp"
+#include "simulation/sizes.hpp"
 #include "simulation/solids.hpp"
 
 namespace itr {
@@ -97,36 +97,15 @@ class Parting final : public Energy {
 /// The largest sag of facets that are in other solids or have these, below an arc through their corners [m].
 template <int Dim>
 double largest_sag(const Solids<Dim>& solids, ConstVectorView y) {
-  constexpr double kLargestTurn = 1.05;  // 60 degrees: more is a corner
   std::set<std::array<int, Dim>> facets;
   solids.for_each_near(0, [&](const FacetPoint<Dim>& point, const Nearest<Dim>& nearest) {
     facets.insert(point.vertices);
     facets.insert(nearest.foot.vertices);
   });
-  const auto corner = [&](int v) { return Vec<Dim>(y.segment<Dim>(Dim * v)); };
-  std::map<std::array<int, Dim - 1>, std::vector<std::array<int, Dim>>> by_ridge;
-  for (const auto& facet : facets)
-    for (int left_out = 0; left_out < Dim; ++left_out) {
-      std::array<int, Dim - 1> ridge;
-      for (int k = 0; k < Dim - 1; ++k) ridge[k] = facet[(left_out + 1 + k) % Dim];
-      std::sort(ridge.begin(), ridge.end());
-      by_ridge[ridge].push_back(facet);
-    }
   double largest = 0;
-  for (const auto& [ridge, pair] : by_ridge) {
-    if (pair.size() != 2) continue;
-    std::array<Vec<Dim>, 2> normals;
-    double height = 0;
-    const double length = Dim == 2 ? 1 : (corner(ridge.front()) - corner(ridge.back())).norm();
-    for (int i = 0; i < 2; ++i) {
-      std::array<Vec<Dim>, Dim> corners;
-      for (int k = 0; k < Dim; ++k) corners[k] = corner(pair[i][k]);
-      normals[i] = inward_normal(corners);
-      height += normals[i].norm() / length / 2;
-    }
-    const double turn = std::acos(std::clamp(normals[0].normalized().dot(normals[1].normalized()), -1.0, 1.0));
-    if (turn < kLargestTurn) largest = std::max(largest, height * turn / 8);
-  }
+  for (const auto& ridge :
+       smooth_ridges<Dim>({facets.begin(), facets.end()}, [&](int v) { return Vec<Dim>(y.segment<Dim>(Dim * v)); }))
+    largest = std::max(largest, ridge.height * ridge.turn / 8);
   return largest;
 }
 
@@ -195,8 +174,8 @@ class OverlapResolver {
   }
 
   /// Moves the surfaces by springs between points and the nearest ones of others, against the elasticity of the bodies,
-  /// until exact predicates find them apart. Springs get stiffer, and the gap wider where points alone do not part the
-  /// facets.
+  /// until exact predicates find them apart. Springs get stiffer, the gap wider where points alone do not part the facets,
+  /// and bodies that nothing holds stay where they come to: else they might return to be pushed away again and again.
   void push_apart() {
     constexpr int kMostRounds = 24, kPatience = 4;
     constexpr double kStiffer = 10, kMostStiffness = 1e6, kEnough = 0.1;
@@ -219,29 +198,35 @@ class OverlapResolver {
       }
       if (are_apart && round > kPatience) gap *= 2;
       if (!are_apart && round > 0) stiffness = std::min(kStiffer * stiffness, kMostStiffness);
-      minimize_with(std::move(parting), start, x);
+      minimize_with(std::move(parting), round > kPatience ? VectorX(x) : start, x);
     }
     refuse(fmt::format("surfaces that stay {} in each other however they are pushed", setup_.units.text(worst, "m", 2)),
            "an overlap of bodies that are not held there, on cells that are larger than the overlap");
   }
 
-  /// The stiffness of a cell [N/m].
+  /// The stiffness of a cell of the stiffest body that deforms, or of rigid ones where there are no others [N/m].
   double unit_stiffness() const {
-    double modulus = 0;
-    for (const auto& [body, material] : setup_.materials) modulus = std::max(modulus, material.youngs_modulus);
-    const double length = tools_.initial_edges.shortest;
-    return modulus * (Dim == 3 ? length : 1);
+    double deformable = 0, rigid = 0;
+    for (const auto& [body, material] : setup_.materials) {
+      double& modulus = rigid_body_of(material) ? rigid : deformable;
+      modulus = std::max(modulus, material.youngs_modulus);
+    }
+    return (deformable > 0 ? deformable : rigid) * (Dim == 3 ? tools_.initial_edges.shortest : 1);
   }
 
-  void minimize_with(std::shared_ptr<const Energy> parting, const VectorX& start, VectorX& x) {
-    constexpr double kHold = 1e-6;  // of the stiffness of a cell: bodies that nothing holds stay where they are
+  /// Bodies that nothing holds stay near x0.
+  void minimize_with(std::shared_ptr<const Energy> parting, const VectorX& x0, VectorX& x) {
+    constexpr double kHold = 1e-6;  // of the stiffness of a cell: far less than bodies have
     if (contact_.map) parting = std::make_shared<MappedEnergy<Dim>>(parting, contact_.map);
     const auto scope = tools_.cache.scope_of(setup_, state_.mesh, state_.chords);
-    EnergySum sum;
-    sum.add(std::make_shared<ElasticEnergy<Dim>>(scope->cells, materials_at(setup_, state_.t), 1, setup_.quadrature_degree));
-    sum.add(std::move(parting));
-    sum.add(std::make_shared<LaggedRegularizationEnergy<Dim>>(start, kHold * unit_stiffness()));
-    const DofMap dofs = DofMap::from_held(held_dofs(setup_, state_.mesh, state_.t).held);
+    const RigidCoordinates<Dim>* const rigid = scope->rigid.get();
+    const auto sum = std::make_shared<EnergySum>();
+    sum->add(
+        std::make_shared<ElasticEnergy<Dim>>(scope->cells, materials_at(setup_, state_.t), 1, setup_.quadrature_degree));
+    sum->add(std::move(parting));
+    sum->add(std::make_shared<LaggedRegularizationEnergy<Dim>>(x0, kHold * unit_stiffness()));
+    const std::vector<char> held = held_dofs(setup_, state_.mesh, state_.t).held;
+    const DofMap dofs = DofMap::from_held(rigid ? rigid->held(held) : held);
     SparseSystem& system = tools_.cache.system;
     system.reset(dofs, Dim, element_stencils(scope->cells));
     ++tools_.cache.served;
@@ -249,7 +234,13 @@ class OverlapResolver {
     options.max_iterations = 50;
     options.cancel = setup_.newton.cancel;
     Workspace workspace;
-    minimize(sum, x, dofs, {}, system, options, workspace);
+    if (!rigid) {
+      minimize(*sum, x, dofs, {}, system, options, workspace);
+      return;
+    }
+    VectorX z = rigid->coordinates_of(x);
+    minimize(MappedEnergy<Dim>(sum, rigid->map()), z, dofs, {}, system, options, workspace);
+    x = rigid->map()->positions(z);
   }
 
   /// The static equilibrium without loads from the state, as one step.
@@ -286,6 +277,7 @@ class OverlapResolver {
     state_.chords = after.chords;
     if (setup_.contact.adaptive_stiffness) state_.stiffness = after.stiffness;
     state_.stored_energy = after.stored_energy;
+    state_.history.viscous = std::move(after.history.viscous);
     return result.report;
   }
 

@@ -56,39 +56,57 @@ std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh) {
 }
 
 template <int Dim>
-std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
+std::vector<SmoothRidge<Dim>> smooth_ridges(const std::vector<std::array<int, Dim>>& facets,
+                                            const std::function<Vec<Dim>(int v)>& at) {
   constexpr double kLargestTurn = 1.05;  // 60 degrees
-  std::map<std::array<int, Dim - 1>, std::vector<FacetId>> corners;
-  for (const FacetId f : mesh.live_facets())
+  std::map<std::array<int, Dim - 1>, std::vector<int>> by_ridge;
+  for (int f = 0; f < static_cast<int>(facets.size()); ++f)
     for (int left_out = 0; left_out < Dim; ++left_out) {
-      std::array<int, Dim - 1> corner;
-      for (int i = 0; i < Dim - 1; ++i) corner[i] = mesh.facet(f)[(left_out + 1 + i) % Dim];
-      std::sort(corner.begin(), corner.end());
-      corners[corner].push_back(f);
+      std::array<int, Dim - 1> ridge;
+      for (int i = 0; i < Dim - 1; ++i) ridge[i] = facets[f][(left_out + 1 + i) % Dim];
+      std::sort(ridge.begin(), ridge.end());
+      by_ridge[ridge].push_back(f);
     }
   // In 2D along the facet, which turns as the normal does; its length is twice the area in 3D.
-  const auto normal_of = [&](FacetId f) -> Vec<Dim> {
-    const auto& facet = mesh.facet(f);
-    const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
+  const auto normal_of = [&](int f) -> Vec<Dim> {
+    const Vec<Dim> a = at(facets[f][1]) - at(facets[f][0]);
     if constexpr (Dim == 2)
       return a;
     else
-      return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0])));
+      return a.cross(Vec<Dim>(at(facets[f][2]) - at(facets[f][0])));
   };
-  std::map<int, double> lost;
-  for (const auto& [corner, facets] : corners) {
-    if (facets.size() != 2) continue;
-    const Vec<Dim> a = normal_of(facets[0]), b = normal_of(facets[1]);
+  std::vector<SmoothRidge<Dim>> ridges;
+  for (const auto& [ridge, pair] : by_ridge) {
+    if (pair.size() != 2) continue;
+    const Vec<Dim> a = normal_of(pair[0]), b = normal_of(pair[1]);
     const double turn = std::acos(std::clamp(a.dot(b) / (a.norm() * b.norm()), -1.0, 1.0));
     if (turn > kLargestTurn) continue;
-    const double length = Dim == 2 ? 1 : (mesh.rest(corner.front()) - mesh.rest(corner.back())).norm();
-    const double height = (a.norm() + b.norm()) / 2 / length;  // of the facets above the corner
-    lost[mesh.body(cell_of_facet(mesh, facets[0]))] += length * height * height * turn / 12;
+    const double length = Dim == 2 ? 1 : (at(ridge.front()) - at(ridge.back())).norm();
+    ridges.push_back({{pair[0], pair[1]}, length, (a.norm() + b.norm()) / 2 / length, turn});
   }
+  return ridges;
+}
+
+template <int Dim>
+std::map<int, double> fractions_of_rounds(const Mesh<Dim>& mesh) {
+  std::vector<FacetId> ids;
+  std::vector<std::array<int, Dim>> facets;
+  for (const FacetId f : mesh.live_facets()) {
+    ids.push_back(f);
+    facets.push_back(mesh.facet(f));
+  }
+  std::map<int, double> lost;
+  for (const auto& ridge : smooth_ridges<Dim>(facets, [&](int v) { return mesh.rest(v); }))
+    lost[mesh.body(cell_of_facet(mesh, ids[ridge.facets[0]]))] +=
+        ridge.length * ridge.height * ridge.height * ridge.turn / 12;
   for (const auto& [body, size] : body_sizes(mesh)) lost[body] /= size.volume;
   return lost;
 }
 
+#define ITR_INSTANTIATE(Dim)                                                                          \
+  template std::vector<SmoothRidge<Dim>> smooth_ridges<Dim>(const std::vector<std::array<int, Dim>>&, \
+                                                            const std::function<Vec<Dim>(int)>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 template std::map<int, double> fractions_of_rounds(const Mesh<2>&);
 template std::map<int, double> fractions_of_rounds(const Mesh<3>&);
 template EdgeLengths edge_lengths(const Mesh<2>&);

@@ -2,7 +2,10 @@
 // How large and how thick bodies are, and how finely they are cut.
 #pragma once
 
+#include <array>
+#include <functional>
 #include <map>
+#include <vector>
 
 #include "itr/mesh.hpp"
 
@@ -29,6 +32,20 @@ double facet_measure(const Mesh<Dim>& mesh, FacetId f);
 /// By id, at rest.
 template <int Dim>
 std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh);
+
+/// A vertex (2D) or edge (3D) between two facets that turn by less than 60 degrees: it may stand for a round.
+template <int Dim>
+struct SmoothRidge {
+  std::array<int, 2> facets;
+  double length = 1;  ///< of the edge [m]; 2D: 1
+  double height = 0;  ///< mean of the facets' over it; 2D: their lengths [m]
+  double turn = 0;    ///< [rad]
+};
+
+/// `facets` are oriented; `at(v)`: where the vertex v is [m]. By the ascending vertices of the ridges.
+template <int Dim>
+std::vector<SmoothRidge<Dim>> smooth_ridges(const std::vector<std::array<int, Dim>>& facets,
+                                            const std::function<Vec<Dim>(int v)>& at);
 
 /// The volume between the boundary and rounds that its corners may stand for, as a fraction of the volume, by body. A corner
 /// of more than 60 degrees is one. Exact to the order of the corners for circles and spheres of regular facets.

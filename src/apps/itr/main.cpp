@@ -92,8 +92,8 @@ int certify(const std::string& directory, bool as_json) {
         certificate.overhang, certificate.units.length(), certificate.blocked_overhang, certificate.units.length());
   if (certificate.overlap > 0)
     fmt::print(
-        "faces that coincide at rest are no contact before they have been apart by d-hat: they overlap by at most {:.2g} "
-        "{}\n",
+        "faces that ties bond, and others that coincide at rest before they have been apart by d-hat, are no contact: they "
+        "overlap by at most {:.2g} {}\n",
         certificate.overlap, certificate.units.length());
   return certificate.passed() ? cli::done : cli::certificate_failed;
 }
