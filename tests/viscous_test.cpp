@@ -374,7 +374,7 @@ TEST(Viscous, StaticsHaveTheLongTermModuli) {
   EXPECT_LE((end_of(true) - given).norm(), 1e-9 * given.norm());
 }
 
-/// A restored simulation repeats its steps, and a step of two halves is one of the same bits as two steps.
+/// A restored simulation repeats its steps.
 TEST(Viscous, RestoredStatesRepeatTheirSteps) {
   auto setup = impact();
   setup.materials[1].plane_strain = true;

@@ -58,12 +58,15 @@ class EigenstrainReader {
     Component component;
   };
 
-  void add(const Node& value, int i, int j) {
+  /// Whether it is not 0.
+  bool add(const Node& value, int i, int j) {
     Component component = read_scalar_function<3>(value, value["no such key"]);
     is_zero_ = is_zero_ && component.is_zero;
     is_constant_ = is_constant_ && value.json().is_number();
     uses_space_ = uses_space_ || component.uses_space;
-    if (!component.is_zero) components_.push_back({i, j, std::move(component)});
+    if (component.is_zero) return false;
+    components_.push_back({i, j, std::move(component)});
+    return true;
   }
 
   void read_isotropic() {
@@ -83,14 +86,12 @@ class EigenstrainReader {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto k = static_cast<int>(i);
       if (is_diagonal) {
-        add(rows[i], k, k);
-        if (k == 2) check_across(rows[i]);
+        add_checked(rows[i], k, k);
         continue;
       }
       const std::vector<Node> row = rows[i].json().is_array() ? rows[i].items() : std::vector<Node>();
       if (row.size() != rows.size()) rows[i].fail("a row of " + std::to_string(rows.size()) + " components");
       for (std::size_t j = 0; j <= i; ++j) read_component(rows, row, i, j);
-      if (k == 2) check_across(row[2]);
     }
     expected_ = "principal values > -1";
   }
@@ -100,16 +101,19 @@ class EigenstrainReader {
     if (row[j].json() != other.json())
       row[j].fail(abbreviate(row[j].json()) + ", but " + abbreviate(other.json()) + " in " + other.pointer(),
                   "a symmetric tensor");
-    const auto k = static_cast<int>(i), l = static_cast<int>(j);
-    const bool shears_plane = i == 2 && j < 2 && (dimension_ == 2 || is_axisymmetric(node_));
-    add(row[j], k, l);
-    if (shears_plane && !read_scalar_function<3>(row[j], row[j]["no such key"]).is_zero)
-      row[j].fail("a shear out of the plane", "0");
+    add_checked(row[j], static_cast<int>(i), static_cast<int>(j));
+  }
+
+  /// Adds a component of a list, which may be other than 0 only where the law has it.
+  void add_checked(const Node& value, int i, int j) {
+    if (!add(value, i, j) || i < 2) return;
+    if (j == 2) return check_across(value);
+    if (dimension_ == 2 || is_axisymmetric(node_)) value.fail("a shear out of the plane", "0");
   }
 
   /// Refuses a strain across the plane that nothing would come of.
   void check_across(const Node& value) const {
-    if (dimension_ == 3 || read_scalar_function<3>(value, value["no such key"]).is_zero) return;
+    if (dimension_ == 3) return;
     const LawSum* sum = sum_of(material_);
     if (sum ? sum->dimension == 3 : material_.plane_strain) return;
     value.fail("a strain across the plane, for a law " +

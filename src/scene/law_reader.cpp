@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 #include <span>
-#include <sstream>
 #include <utility>
 
 #include "readers.hpp"
@@ -212,11 +211,9 @@ void Requirement::check(const Vec<3>& X) const {
   const double here = value(X);
   if (std::isfinite(here) && is_met(here)) return;
   InputError::Parts wrong = parts;
-  if (value.function) {
-    std::ostringstream found;
-    found << parts.found << ", which is " << here / unit << " at X = (" << X.transpose() / length << ")";
-    wrong.found = found.str();
-  }
+  if (value.function)
+    wrong.found =
+        fmt::format("{}, which is {:g} at X = ({:g})", parts.found, here / unit, fmt::join(Vec<3>(X / length), ", "));
   throw InputError(wrong);
 }
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "geometry/quadratic_bernstein.hpp"
+#include "growth.hpp"
 
 namespace itr {
 
@@ -250,9 +251,7 @@ typename JacobianBarrier<Dim>::Block JacobianBarrier<Dim>::hessian() const {
 
 template <int Dim>
 double stiffness_at_rest(const ElasticModuli& moduli) {
-  ElasticModuli law = moduli;
-  law.growth = {};
-  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), law).values;
+  const auto values = elastic_eigensystem<Dim>(Mat<Dim>::Identity(), without_growth(moduli)).values;
   return *std::max_element(values.begin(), values.end());
 }
 

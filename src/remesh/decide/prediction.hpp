@@ -32,8 +32,9 @@ template <int Dim>
 inline constexpr double kPatchOverPredictionInContact = Dim == 2 ? 10 : 5;
 
 /// Predicts the gain of an edit by elasticity, inertia (history interpolated) and dead loads when only the vertex that it
-/// sets relaxes, to second order: a microsecond [J, times the scaling]. Infinite where the scene has pressure, damping or
-/// terms of the program; at curved edges an estimate, in which each node relaxes by itself and history is left out.
+/// sets relaxes, to second order: a microsecond [J, times the scaling]. Infinite where the scene has viscoelasticity,
+/// pressure, damping or terms of the program; at curved edges an estimate, in which each node relaxes by itself and history
+/// is left out.
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit);
 
