@@ -139,7 +139,9 @@ TEST(AtRest, APluckedCantileverRingsDown) {
       const auto result = simulation.advance();
       ASSERT_TRUE(result.ok) << "step " << i + 1 << ": " << result.reason;
       const double energy = result.report.energy.elastic;
-      if (before > 1e-100) ASSERT_LE(energy, before) << "step " << i + 1;
+      if (before > 1e-100) {
+        ASSERT_LE(energy, before) << "step " << i + 1;
+      }
       before = energy;
       iterations += result.report.newton_iterations;
     }
@@ -202,8 +204,8 @@ TEST(AtRest, VelocitiesUnderAGrowingLoadAreThoseOfTheirSteps) {
     const History& history = simulation.state().history;
     const Eigen::Map<const VectorX> rest(setup.mesh.rest()[0].data(), history.x[0].size());
     const VectorX mean = (history.x[0] - rest) / result.report.t;
-    if (result.report.step > 5)
-      EXPECT_LE((history.v[0] - mean).lpNorm<Eigen::Infinity>(), 2e-3 * mean.lpNorm<Eigen::Infinity>());
+    if (result.report.step <= 5) continue;
+    EXPECT_LE((history.v[0] - mean).lpNorm<Eigen::Infinity>(), 2e-3 * mean.lpNorm<Eigen::Infinity>());
   }
 }
 

@@ -198,6 +198,22 @@ TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouch) {
   EXPECT_EQ(other.state().chords, simulation.state().chords);
 }
 
+/// Presses a ball by a barrier that gives way until gaps are narrower than the shortest chords allow: no step is taken.
+TEST(ChordBound, StopsStepsThatCurvesMayNotTake) {
+  itr::Setup<2> setup = pressed_ball<2>(3, 20);
+  setup.contact.barrier_stiffness *= 1e-5;
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  StepResult result = simulation.advance();
+  while (result.ok && !simulation.finished()) {
+    EXPECT_LT(find_chord_demand(setup, simulation.mesh(), simulation.state().chords, simulation.positions()).excess, 2);
+    result = simulation.advance();
+  }
+  EXPECT_FALSE(result.ok);
+  EXPECT_NE(result.reason.find("curved edges may reach into what they touch"), std::string::npos) << result.reason;
+  EXPECT_EQ(depth_in_plates(simulation.state()), 0);
+}
+
 /// Lets one edge of a ball at rest come down beside a plate.
 TEST(ChordBound, CountsWhatIsNearACurve) {
   itr::Setup<2> setup = pressed_ball<2>(1, 4);
@@ -224,7 +240,8 @@ TEST(ChordBound, CountsWhatIsNearACurve) {
   const Logger logger([&](LogLevel level, std::string_view message) {
     told += level == LogLevel::warning && message.find("can have no shorter chords") != message.npos;
   });
-  State<2> state{.mesh = mesh, .history = {}};
+  State<2> state;
+  state.mesh = mesh;
   state.history.x = {x};
   Watch<2> watch;
   for (int step = 0; step < 2; ++step) watch.look(setup, state, {}, {}, logger);

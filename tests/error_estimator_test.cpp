@@ -92,7 +92,7 @@ TEST(ErrorEstimator, FindsWhatRefinedQuadraticElementsGainOnALinearProblem) {
 
 TEST(ErrorEstimator, FindsNothingWhereTheSolutionIsInTheSpace) {
   for (const int order : {1, 2}) {
-    itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {});
+    itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, Vec<2>(0, 0));
     setup.order = {{1, order}};
     setup.dirichlet.clear();
     for (const int side : {1, 2, 3, 4})
@@ -109,7 +109,7 @@ TEST(ErrorEstimator, FindsNothingWhereTheSolutionIsInTheSpace) {
 
 /// A square that an obstacle presses onto another one.
 itr::Setup<2> pressed(double dhat) {
-  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, {});
+  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, Vec<2>(0, 0));
   setup.dirichlet.resize(1);
   setup.dirichlet[0].tag = 2;
   setup.obstacles.rest = {{-0.1, kSize + 1e-3}, {0.13, kSize + 1e-3}};

@@ -44,7 +44,7 @@ Vec<Dim> mean_displacement(const Simulation<Dim>& simulation) {
 }
 
 TEST(LooseBodies, ComeDownStraightWhateverModulusAndSolver) {
-  for (const std::string& solver : {"eigen:ldlt", "eigen:lu"})
+  for (const std::string solver : {"eigen:ldlt", "eigen:lu"})
     for (const double modulus : {1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11}) {
       SCOPED_TRACE(solver + " " + std::to_string(modulus));
       linear::Registry registry;
@@ -158,7 +158,7 @@ TEST(LooseBodies, InBalanceDoNotDrift) {
 
 /// A pressure all around resists turns of a linear elastic body, by far less than the body resists strains.
 TEST(LooseBodies, UnderPressureDoNotTurn) {
-  for (const std::string& solver : {"eigen:ldlt", "eigen:lu"}) {
+  for (const std::string solver : {"eigen:ldlt", "eigen:lu"}) {
     SCOPED_TRACE(solver);
     auto setup = square_above_a_table(8.7e10, solver);
     setup.materials[1].law = MaterialLaw::linear;

@@ -7,7 +7,7 @@ set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 preset=${1:?asan or tsan} jobs=${2:-2}
 build=build/$preset
-tests=(remesh_test remesh_curved_test remesh_curved_prediction_test remesh_curved_run_test remesh_curved_contact_test candidates_test curved_host_test change_log_test reuse_test newton_parts_test remesh_3d_test remesh_decision_test remesh_allocation_test prospect_test history_transfer_test simulation_test host_test embed_test mesh_change_test bad_input_test hdf5_test task_factor_test adaptive_time_test error_estimator_test cavity_test friction_pairs_test volume_patches_test axisymmetry_test polyfem_keys_test)
+tests=(remesh_test remesh_curved_test remesh_curved_prediction_test remesh_curved_run_test remesh_curved_contact_test candidates_test curved_host_test change_log_test reuse_test newton_parts_test remesh_3d_test remesh_decision_test remesh_allocation_test prospect_test history_transfer_test simulation_test host_test embed_test mesh_change_test bad_input_test hdf5_test task_factor_test adaptive_time_test error_estimator_test cavity_test friction_pairs_test volume_patches_test axisymmetry_test polyfem_keys_test tie_test rigid_test overlap_test viscous_test eigenstrain_test)
 examples=(own_time_loop own_energy_term own_material own_solver contact_only transfer two_threads coupling)
 # HDF5 asks for as much memory as a damaged file says, and gets over not having it.
 export OMP_NUM_THREADS=1 ASAN_OPTIONS="allocator_may_return_null=1 suppressions=$PWD/tests/asan.supp" LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp print_suppressions=0" TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp history_size=4" UBSAN_OPTIONS=print_stacktrace=1

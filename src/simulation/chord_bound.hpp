@@ -10,6 +10,9 @@
 
 namespace itr {
 
+/// From this excess on, a curve may reach as far as something is away from its chords.
+inline constexpr double kMostExcess = 2;
+
 struct ChordDemand {
   ChordLevels levels;  ///< with those halvings that the bound asks for, and that dhat leaves room for
   double excess = 0;   ///< largest ratio of how far a curve leaves its chords to how far it may: the bound holds up to 1

@@ -235,16 +235,18 @@ class StepSolver {
                                                   next_.quadrature, next_.chords);
   }
 
-  /// Solves from x, and again from there with more chords as long as curves leave theirs too far.
+  /// Solves from x, and again from there with more chords as long as curves leave theirs too far. Where no chords keep them
+  /// out of what they touch, this is no solution.
   NewtonSummary solve_between_chords(const VectorX& expected = {}) {
     constexpr int kMostSolves = 8;
     const VectorX start = x_;
     make_problem();
     NewtonSummary summary = solve(expected);
+    ChordDemand demand{{}, 0};
     for (int solves = 1; summary.converged(); ++solves) {
-      const ChordDemand demand = find_chord_demand(setup_, next_.mesh, next_.chords, x_);
+      demand = find_chord_demand(setup_, next_.mesh, next_.chords, x_);
       if (demand.excess <= 1 || demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start))
-        return summary;  // Watch tells of what is left
+        break;  // Watch tells of what is left
       ChordLevels fewer = std::exchange(next_.chords, demand.levels);
       VectorX solution = std::exchange(x_, start);  // where the next solve begins, if the way there is free
       auto problem_before = std::move(problem_);
@@ -256,9 +258,16 @@ class StepSolver {
         next_.chords = std::move(fewer);
         x_ = std::move(solution);
         problem_ = std::move(problem_before);
-        return summary;
+        break;
       }
       summary = with_more;
+    }
+    if (summary.converged() && demand.excess >= kMostExcess) {
+      summary.termination = Termination::infeasible;
+      summary.message = fmt::format(
+          "curved edges may reach into what they touch, since they leave their shortest chords by {:.2g} times half of the "
+          "gap: a stiffer barrier, with wider gaps, or a finer mesh helps",
+          demand.excess);
     }
     return summary;
   }
