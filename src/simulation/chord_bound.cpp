@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "fem/chords.hpp"
 #include "fem/refined_chords.hpp"
 #include "geometry/bvh.hpp"
+#include "geometry/quadratic_patch.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
 
@@ -74,19 +76,32 @@ class ChordBound {
   /// By slot of facets: how far curves leave their chords, times `factor`, by how far they may.
   std::vector<double> excess(double factor = 1) const {
     std::vector<double> result(mesh_.facet_slots(), 0);
-    std::vector<int> hits;
-    for (int i = 0; i < own_; ++i) {
-      const double height = factor * heights_[i];
-      if (height == 0) continue;
-      Box<Dim> box;
-      for (const Vec<Dim>& p : corners_[i]) box.include(p);
-      hits.clear();
-      tree_.query(box.inflated(2 * height / kOfGap), hits);  // a gap that is larger allows that height
-      double& worst = result[chords_.parents[i]];
-      for (const int j : hits)
-        if (!are_neighbours(i, j) && !are_closed(i, j)) worst = std::max(worst, height / allowed(i, j));
-    }
+    for_each_pair(factor, [&](int i, int, double excess) {
+      result[chords_.parents[i]] = std::max(result[chords_.parents[i]], excess);
+      return true;
+    });
     return result;
+  }
+
+  /// Whether Bernstein bounds prove that curves are apart from what they may reach by how far they leave their chords.
+  bool are_curves_apart() const {
+    constexpr double kMayReach = 2;  // half of the gap is what they may leave chords by
+    const auto patch_of = [&](int i) {
+      if (i >= own_)
+        return quadratic_patch<Dim>(corners_[i], [&](int k, int l) { return (corners_[i][k] + corners_[i][l]) / 2; });
+      const auto& facet = mesh_.facet(chords_.parents[i]);
+      Corners<Dim> corners;
+      for (int k = 0; k < Dim; ++k) corners[k] = at(facet[k]);
+      return quadratic_patch<Dim>(corners, [&](int k, int l) -> Vec<Dim> {
+        const int node = mesh_.node_of(facet[k], facet[l]);
+        return node == kNone ? Vec<Dim>((corners[k] + corners[l]) / 2) : at(node);
+      });
+    };
+    std::set<std::pair<FacetId, int>> proven;
+    return for_each_pair(1, [&](int i, int j, double excess) {
+      const std::pair<FacetId, int> pair{chords_.parents[i], j < own_ ? chords_.parents[j] : mesh_.facet_slots() + j};
+      return excess < kMayReach || !proven.insert(pair).second || are_apart(patch_of(i), patch_of(j));
+    });
   }
 
   ChordDemand demand() const {
@@ -121,6 +136,24 @@ class ChordBound {
   }
 
  private:
+  /// Calls visit(i, j, excess) for each simplex i that a curve leaves and what may be too near to it, with the ratio of how
+  /// far it does, times `factor`, to how far it may. False once a visit is.
+  template <typename Visit>
+  bool for_each_pair(double factor, const Visit& visit) const {
+    std::vector<int> hits;
+    for (int i = 0; i < own_; ++i) {
+      const double height = factor * heights_[i];
+      if (height == 0) continue;
+      Box<Dim> box;
+      for (const Vec<Dim>& p : corners_[i]) box.include(p);
+      hits.clear();
+      tree_.query(box.inflated(2 * height / kOfGap), hits);  // a gap that is larger allows that height
+      for (const int j : hits)
+        if (!are_neighbours(i, j) && !are_closed(i, j) && !visit(i, j, height / allowed(i, j))) return false;
+    }
+    return true;
+  }
+
   Vec<Dim> at(int node) const { return vertex_of<Dim>(x_, node); }
   int level(int edge) const { return levels_.empty() ? 0 : levels_[edge]; }
 
@@ -231,6 +264,12 @@ ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
 }
 
 template <int Dim>
+bool are_curves_apart(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, const VectorX& x) {
+  return !has_chords(setup, mesh) ||
+         ChordBound<Dim>(setup, mesh, levels, refine_chords(mesh, levels), x, 0).are_curves_apart();
+}
+
+template <int Dim>
 ChordLevels settled_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ChordLevels levels,
                            std::span<const VectorX> positions) {
   for (int age = 0; age < static_cast<int>(positions.size()); ++age)
@@ -267,6 +306,7 @@ ChordLevels lowered_chords(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
   template ChordDemand find_chord_demand(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&, int); \
+  template bool are_curves_apart(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, const VectorX&);              \
   template ChordLevels settled_chords(const StepSetup<Dim>&, const Mesh<Dim>&, ChordLevels, std::span<const VectorX>);      \
   template ChordLevels lowered_chords(const StepSetup<Dim>&, const Mesh<Dim>&, const ChordLevels&, std::span<const VectorX>);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

@@ -10,9 +10,6 @@
 
 namespace itr {
 
-/// From this excess on, a curve may reach as far as something is away from its chords.
-inline constexpr double kMostExcess = 2;
-
 struct ChordDemand {
   ChordLevels levels;  ///< with those halvings that the bound asks for, and that dhat leaves room for
   double excess = 0;   ///< largest ratio of how far a curve leaves its chords to how far it may: the bound holds up to 1
@@ -23,6 +20,10 @@ struct ChordDemand {
 template <int Dim>
 ChordDemand find_chord_demand(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels,
                               const VectorX& x, int age = 0);
+
+/// Whether curves at positions x, whose excess may be more than 1, are proven to be apart from what they may reach.
+template <int Dim>
+bool are_curves_apart(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, const VectorX& x);
 
 /// Adds as many halvings to `levels` as curves at all of these positions, newest first, ask for.
 template <int Dim>

@@ -235,8 +235,8 @@ class StepSolver {
                                                   next_.quadrature, next_.chords);
   }
 
-  /// Solves from x, and again from there with more chords as long as curves leave theirs too far. Where no chords keep them
-  /// out of what they touch, this is no solution.
+  /// Solves from x, and again from there with more chords as long as curves leave theirs too far. Where curves reach into
+  /// what they touch all the same, this is no solution.
   NewtonSummary solve_between_chords(const VectorX& expected = {}) {
     constexpr int kMostSolves = 8;
     const VectorX start = x_;
@@ -262,11 +262,12 @@ class StepSolver {
       }
       summary = with_more;
     }
-    if (summary.converged() && demand.excess >= kMostExcess) {
+    if (summary.converged() && demand.excess > 1 && !are_curves_apart(setup_, next_.mesh, next_.chords, x_)) {
       summary.termination = Termination::infeasible;
       summary.message = fmt::format(
-          "curved edges may reach into what they touch, since they leave their shortest chords by {:.2g} times half of the "
-          "gap: a stiffer barrier, with wider gaps, or a finer mesh helps",
+          "curved edges reach into what they touch, since they leave their shortest chords by {:.2g} times of what they "
+          "may: "
+          "a stiffer barrier, with wider gaps, or a finer mesh helps",
           demand.excess);
     }
     return summary;

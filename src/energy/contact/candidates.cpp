@@ -55,12 +55,13 @@ bool collect(std::size_t n, std::size_t most, const Find& find, std::vector<std:
   return true;
 }
 
-/// Finds items that overlap the box, ascending: pairs, and with them the bits of CCD, do not depend on how a tree came
-/// about.
-template <int Dim>
-void find_overlaps(const Bvh<Dim>& tree, const Box<Dim>& box, std::vector<int>& hits) {
+/// Finds items that overlap the box and that `matters(i)` accepts, ascending: pairs, and with them the bits of CCD, do not
+/// depend on how a tree came about.
+template <int Dim, typename Matters>
+void find_overlaps(const Bvh<Dim>& tree, const Box<Dim>& box, const Matters& matters, std::vector<int>& hits) {
   hits.clear();
   tree.query(box, hits);
+  std::erase_if(hits, [&](int i) { return !matters(i); });
   std::sort(hits.begin(), hits.end());
 }
 
@@ -127,9 +128,9 @@ bool find_vertex_pairs(const CollisionSurface& surface, const std::vector<std::a
   const auto find = [&](int k, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     const int v = surface.vertices[k];
     if (!counts(surface, v) && !vertex_boxes[v].overlaps(counting)) return;
-    find_overlaps(tree, vertex_boxes[v], hits);
-    for (const int i : hits)
-      if (matters(surface, v, primitives[i])) found.push_back({v, i});
+    find_overlaps(
+        tree, vertex_boxes[v], [&](int i) { return matters(surface, v, primitives[i]); }, hits);
+    for (const int i : hits) found.push_back({v, i});
   };
   return collect(surface.vertices.size(), most, find, pairs);
 }
@@ -139,21 +140,24 @@ bool find_edge_pairs(const CollisionSurface& surface, const std::vector<Box<Dim>
                      BoxTable<Dim>& table, std::size_t most, std::vector<std::array<int, 2>>& pairs) {
   pairs.clear();
   const auto& edges = surface.edges;
-  const auto consider = [&](int e, int f, std::vector<std::array<int, 2>>& found) {
-    const bool both = counts(surface, edges[f]);
-    if (both ? f <= e : f == e) return;
-    if (matters(surface, edges[e], edges[f])) found.push_back({std::min(e, f), std::max(e, f)});
+  const auto is_pair = [&](int e, int f) {  // once where both count
+    return (counts(surface, edges[f]) ? e < f : e != f) && matters(surface, edges[e], edges[f]);
   };
+  const auto add = [](int e, int f, std::vector<std::array<int, 2>>& to) { to.push_back({std::min(e, f), std::max(e, f)}); };
   if (are_few_edge_pairs(surface)) {
     table.reset(boxes);
     for (int e = 0; e < static_cast<int>(edges.size()); ++e)
-      if (counts(surface, edges[e])) table.visit_overlaps(boxes[e], [&](int f) { consider(e, f, pairs); });
+      if (counts(surface, edges[e]))
+        table.visit_overlaps(boxes[e], [&](int f) {
+          if (is_pair(e, f)) add(e, f, pairs);
+        });
     return true;
   }
   const auto find = [&](int e, std::vector<int>& hits, std::vector<std::array<int, 2>>& found) {
     if (!counts(surface, edges[e])) return;  // found from the other side, or of no account
-    find_overlaps(tree, boxes[e], hits);
-    for (const int f : hits) consider(e, f, found);
+    find_overlaps(
+        tree, boxes[e], [&](int f) { return is_pair(e, f); }, hits);
+    for (const int f : hits) add(e, f, found);
   };
   return collect(edges.size(), most, find, pairs);
 }
