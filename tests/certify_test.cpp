@@ -312,6 +312,37 @@ TEST_F(CertifyTest, FindsCurvesInObstaclesThatTheirChordsDoNotReach) {
   EXPECT_EQ(violations(0.25, 0.26, -0.25), 2u) << "wholly between curve and chord";
 }
 
+/// Chords through the nodes of a dent cut off the tip of what is in there; its other vertices tell that it is outside.
+TEST_F(CertifyTest, LetsTipsReachIntoDentsOfCurves) {
+  Plane plane;
+  plane.mesh.set_curved_edges({{2, 3}});
+  VectorX x(18);
+  x << plane.x, 0.5, 0.8;
+  plane.x = x;
+  plane.v = VectorX::Zero(18);
+  plane.density.assign(4, 0);
+  const auto put_tip = [&](double y) {  // at x = 1/4 the parabola is at 0.85, its chord at 0.9
+    const std::vector<Vec<2>> corners = {{0.25, y}, {0.3, 1.75}, {0.3, 2.75}, {0.25, 2.75}};
+    for (int i = 0; i < 4; ++i) vertex_of<2>(plane.x, 4 + i) = corners[i];
+  };
+  put_tip(0.875);
+  EXPECT_TRUE(violations_of(plane).empty()) << ::testing::PrintToString(texts_of(certificate));
+  put_tip(0.82);
+  EXPECT_FALSE(violations_of(plane).empty());
+
+  Solid solid;
+  solid.mesh.set_curved_edges({{1, 2}, {1, 3}, {2, 3}});
+  x.resize(21);
+  const Vec<3> dent = Vec<3>::Constant(-0.06);  // 4/3 of it in the middle of the face
+  x << solid.x, Vec<3>(0.5, 0.5, 0) + dent, Vec<3>(0.5, 0, 0.5) + dent, Vec<3>(0, 0.5, 0.5) + dent;
+  solid.x = x;
+  solid.v = VectorX::Zero(21);
+  for (const double depth : {1.15, 1.4}) {
+    solid.obstacle_x = {Vec<3>::Constant(1.0 / 3) + depth * dent, {5, 5, 4.5}, {5, 4.5, 5}};
+    EXPECT_EQ(violations_of(solid).empty(), depth < 4.0 / 3) << ::testing::PrintToString(texts_of(certificate));
+  }
+}
+
 /// The curved edge 0 1 pierces the facet 2 3 4, which shares a vertex with each of the two facets beside that edge.
 TEST_F(CertifyTest, FindsACurvedEdgeInAFacetThatNeighboursBothOfItsOwn) {
   Solid solid;

@@ -115,7 +115,7 @@ bool ClosedSurface<Dim>::touches(const Vec<Dim>& p) const {
 }
 
 template <int Dim>
-std::vector<int> ClosedSurface<Dim>::nested() const {
+std::vector<int> ClosedSurface<Dim>::nested(const std::vector<char>& doubtful) const {
   std::vector<double> volume(first_.size(), 0);  // times d!, of the sign of the orientation
   for (const Facet& f : facets_) {
     const int part = part_[f[0]];
@@ -123,10 +123,12 @@ std::vector<int> ClosedSurface<Dim>::nested() const {
     for (int k = 0; k < Dim; ++k) corners.col(k) = x_[f[k]] - x_[first_[part]];
     volume[part] += corners.determinant();
   }
-  std::vector<int> found;
-  for (std::size_t part = 0; part < first_.size(); ++part) {
-    const int around = winding(x_[first_[part]], static_cast<int>(part));
-    if (around * volume[part] > 0) found.push_back(first_[part]);
+  std::vector<int> asked = first_, found;
+  for (int v = static_cast<int>(doubtful.size()) - 1; v >= 0; --v)
+    if (part_[v] != kNone && doubtful[v] == 0) asked[part_[v]] = v;
+  for (std::size_t part = 0; part < asked.size(); ++part) {
+    const int around = winding(x_[asked[part]], static_cast<int>(part));
+    if (around * volume[part] > 0) found.push_back(asked[part]);
   }
   return found;
 }

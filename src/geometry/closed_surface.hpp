@@ -33,11 +33,13 @@ class ClosedSurface {
   int winding(const Vec<Dim>& p, int left_out = kNone) const;
   /// Whether a closed facet has the point.
   bool touches(const Vec<Dim>& p) const;
-  /// Whether a point is a vertex of the surface.
+  /// Whether a point is a vertex of the surface, and of which part; kNone: of none.
   bool is_vertex(int v) const { return part_[v] != kNone; }
+  int part_of(int v) const { return part_[v]; }
   /// One vertex of each part whose inside is the inside of another part, too: of solids in solids, not of cavities. For
-  /// facets with an orientation that do not cross each other.
-  std::vector<int> nested() const;
+  /// facets with an orientation that do not cross each other. Parts are asked at a vertex that is not `doubtful`, if they
+  /// have one; empty: none is.
+  std::vector<int> nested(const std::vector<char>& doubtful = {}) const;
   /// The deepest overlap of bodies, at points of each facet: infinite where the facet has no closed vertex. Less than 1e3
   /// `closed.coincident` is none. For facets that are oriented outward; those with a vertex that is `left_out` do not count.
   Overlap<Dim> find_overlap(const ClosedFaces& closed, const std::vector<char>& left_out = {}) const;

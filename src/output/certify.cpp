@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "core/connected_parts.hpp"
 #include "curve_checks.hpp"
 #include "fem/quadratic.hpp"
 #include "frame_surface.hpp"
@@ -164,15 +165,21 @@ void check_surface(const FrameSurface<3>& surface, const std::string& name, std:
 }
 
 /// Finds vertices inside of bodies, where no surfaces cross. A surface of obstacles may hold bodies: it is a container.
-/// `in_hollows`: vertices that chords have inside and curves have not.
+/// Chords may have a vertex near a curve on the wrong side: others that surfaces connect it to are asked in its place.
 template <int Dim>
-void check_insides(const FrameSurface<Dim>& surface, const std::set<int>& in_hollows, const std::string& name,
+void check_insides(const FrameSurface<Dim>& surface, const Patches<Dim>& curves, const std::string& name,
                    std::vector<Violation>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
+  const std::vector<char> doubtful = find_doubtful(surface, curves, closed);
+  const std::set<int> in_hollows = find_in_hollows(surface, curves);
+  const std::vector<int> part = connected_parts<2>(surface.x.size(), surface.edges);
+  std::vector<char> is_part_known(surface.x.size(), 0);
+  for (std::size_t v = 0; v < part.size(); ++v)
+    if (doubtful[v] == 0) is_part_known[part[v]] = 1;
   const std::string what = surface.has_proxy ? "the proxy" : "a body";
   const int first = surface.has_proxy ? 0 : surface.num_body_vertices;
   for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
-    if (closed.is_vertex(v)) continue;
+    if (closed.is_vertex(v) || (doubtful[v] != 0 && is_part_known[part[v]] != 0)) continue;
     const bool touches = closed.touches(surface.x[v]);
     if (touches || (closed.winding(surface.x[v]) + static_cast<int>(in_hollows.count(v))) % 2 != 0)
       violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v),
@@ -180,7 +187,7 @@ void check_insides(const FrameSurface<Dim>& surface, const std::set<int>& in_hol
   }
   if (surface.has_proxy) return;  // need not have an orientation that tells a solid from a cavity
   if (!surface.closed.empty()) return;
-  for (const int v : closed.nested())
+  for (const int v : closed.nested(doubtful))
     violations.push_back(
         {Of::surfaces, fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v))});
 }
@@ -240,7 +247,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   check_surface(surface, name, violations);
   Patches<Dim> curves;
   if (!surface.curved.empty()) curves = true_surface(frame, surface);
-  if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
+  if (violations.size() == before) check_insides(surface, curves, name, violations);
   check_overlap(frame, surface, name, certificate);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);

@@ -14,15 +14,21 @@ bool is_nearer(const Vec<Dim>& a, const Vec<Dim>& b, const FrameSurface<Dim>& su
   return simplex_distance_squared<Dim>(std::array{a, b}, corners) < distance * distance;
 }
 
+template <int Dim>
+Box<Dim> box_of(const QuadraticPatch<Dim>& patch) {
+  Box<Dim> box;
+  for (const auto& row : patch.at)
+    for (const Vec<Dim>& p : row) box.include(p);
+  return box;
+}
+
 /// Calls visit(vertex, curve, is_hollow) for vertices between a curve and its chords, where neither is crossed. `is_hollow`:
 /// the curve lies on the body's side of the chord.
 template <typename Visit>
 void for_each_beyond_chord(const FrameSurface<2>& surface, const Patches<2>& all, const Visit& visit) {
   for (std::size_t i = 0; i < all.patches.size(); ++i) {
     if (!all.is_curved[i]) continue;
-    Box<2> box;
-    for (const auto& row : all.patches[i].at)
-      for (const Vec<2>& p : row) box.include(p);
+    const Box<2> box = box_of(all.patches[i]);
     const auto halves = parts_of(all.patches[i]);
     for (std::size_t j = 0; j < all.facets.size(); ++j) {
       const auto& other = all.facets[j];
@@ -70,6 +76,27 @@ Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& sur
 }
 
 template <int Dim>
+std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<Dim>& all,
+                                const ClosedSurface<Dim>& closed) {
+  std::vector<char> doubtful(surface.x.size(), 0);
+  std::vector<Box<Dim>> boxes;
+  std::vector<int> parts;
+  for (std::size_t i = 0; i < all.patches.size(); ++i) {
+    if (!all.is_curved[i]) continue;
+    parts.push_back(closed.part_of(all.facets[i][0]));
+    boxes.push_back(box_of(all.patches[i]));
+  }
+  const Bvh<Dim> tree(boxes);
+  std::vector<int> hits;
+  for (int v = 0; v < static_cast<int>(doubtful.size()); ++v) {
+    hits.clear();
+    tree.query({surface.x[v], surface.x[v]}, hits);
+    doubtful[v] = std::ranges::any_of(hits, [&](int i) { return parts[i] != closed.part_of(v); });
+  }
+  return doubtful;
+}
+
+template <int Dim>
 std::set<int> find_in_hollows([[maybe_unused]] const FrameSurface<Dim>& surface, [[maybe_unused]] const Patches<Dim>& all) {
   std::set<int> found;
   if constexpr (Dim == 2)
@@ -83,9 +110,7 @@ template <int Dim>
 void check_curves(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const std::string& name,
                   std::vector<Violation>& violations) {
   std::vector<Box<Dim>> boxes(all.patches.size());
-  for (std::size_t i = 0; i < boxes.size(); ++i)
-    for (const auto& row : all.patches[i].at)
-      for (const Vec<Dim>& p : row) boxes[i].include(p);
+  for (std::size_t i = 0; i < boxes.size(); ++i) boxes[i] = box_of(all.patches[i]);
   const Bvh<Dim> tree(boxes);
   std::vector<int> hits;
   for (int i = 0; i < static_cast<int>(boxes.size()); ++i) {
@@ -146,6 +171,7 @@ void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surfac
 
 #define ITR_INSTANTIATE(Dim)                                                                                              \
   template Patches<Dim> true_surface(const StoredFrame&, const FrameSurface<Dim>&);                                       \
+  template std::vector<char> find_doubtful(const FrameSurface<Dim>&, const Patches<Dim>&, const ClosedSurface<Dim>&);     \
   template std::set<int> find_in_hollows(const FrameSurface<Dim>&, const Patches<Dim>&);                                  \
   template void check_curves(const FrameSurface<Dim>&, const Patches<Dim>&, const std::string&, std::vector<Violation>&); \
   template void measure_overhangs(const StoredFrame&, const FrameSurface<Dim>&, Certificate&);

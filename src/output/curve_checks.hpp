@@ -8,6 +8,7 @@
 
 #include "certify.hpp"
 #include "frame_surface.hpp"
+#include "geometry/closed_surface.hpp"
 #include "geometry/quadratic_patch.hpp"
 
 namespace itr::output {
@@ -22,6 +23,10 @@ struct Patches {
 
 template <int Dim>
 Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& surface);
+
+/// By vertex: whether chords and curves may have it on different sides, as in the box of a curve's control points.
+template <int Dim>
+std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const ClosedSurface<Dim>& closed);
 
 /// Vertices that chords have inside of a body and curves have not. None in 3D, which is the safe side.
 template <int Dim>
