@@ -98,17 +98,22 @@ itr::Setup<2> press_fit(int around, int through) {
   return setup;
 }
 
+/// With a d-hat of 1e-4 of the overlap, too: at their corners the planes of symmetry, which are nearer, are no way out.
 TEST(Overlap, RingsPressAsLameSays) {
-  linear::Registry registry;
-  Simulation<2> simulation(press_fit(300, 14), registry);
-  EXPECT_LE(simulation.setup().contact.dhat, 0.01 * kOverlap);
-  const double p = press_fit_pressure(kA, kB, kC, kE, kNu, kOverlap);
-  const double stored = simulation.interference_energy();
-  EXPECT_NEAR(stored, p * kOverlap / 2 * std::numbers::pi / 2 * kB, 0.015 * stored);  // half of force times way
-  const StepResult result = advance(simulation);
-  EXPECT_NEAR(mean_radial_stress(simulation, 1, kB), -p, 0.005 * p);
-  EXPECT_NEAR(mean_radial_stress(simulation, 2, kB), -p, 0.005 * p);
-  EXPECT_GT(result.report.min_distance, 0);
+  for (const double dhat : {0.0, 1e-4 * kOverlap}) {
+    itr::Setup<2> setup = press_fit(300, 14);
+    setup.contact.dhat = dhat;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    EXPECT_LE(simulation.setup().contact.dhat, 0.001 * kOverlap);
+    const double p = press_fit_pressure(kA, kB, kC, kE, kNu, kOverlap);
+    const double stored = simulation.interference_energy();
+    EXPECT_NEAR(stored, p * kOverlap / 2 * std::numbers::pi / 2 * kB, 0.01 * stored);  // half of force times way
+    const StepResult result = advance(simulation);
+    EXPECT_NEAR(mean_radial_stress(simulation, 1, kB), -p, 0.004 * p);
+    EXPECT_NEAR(mean_radial_stress(simulation, 2, kB), -p, 0.004 * p);
+    EXPECT_GT(result.report.min_distance, 0);
+  }
 }
 
 /// The soft side gives way, and rest shapes stay.

@@ -146,7 +146,7 @@ class Direction {
     if (!has_solution || !std::isfinite(solved_.residual) || !solution.allFinite())
       return fail(std::string(to_string(solved_.outcome)) + ", " + task_.system.message());
     is_loose_ = solved_.residual > kTightResidual && solved_.residual <= asked_;
-    if (!is_loose_) task_.summary.linear_residual = std::max(task_.summary.linear_residual, solved_.residual);
+    if (!is_loose_) task_.summary.linear_residual = solved_.residual;  // errors of earlier ones are made good
     if (!set_step(rhs, solution)) return false;
     step_.is_of_shift = shift.value > 0 && task_.system.curvature_of(shift, solution) > kMostOfShift * solution.dot(rhs);
     return true;

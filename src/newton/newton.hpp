@@ -149,7 +149,7 @@ struct NewtonSummary {
   double gradient_norm = 0;    ///< over the unknowns, at the last evaluation, in the options' norm
   double step_norm = 0;        ///< of the last full step, in the options' norm
   double decrement = 0;        ///< -p.g/2 of the last full step p: what the model says that it gains [J s^2]
-  double linear_residual = 0;  ///< worst relative residual of the linear solves
+  double linear_residual = 0;  ///< relative residual of the last linear solve
   double assembly_seconds = 0, linear_seconds = 0, line_search_seconds = 0, ccd_seconds = 0;
   /// Positions and step [m] of the last one blocked in a long solve, else empty: whoever explains it finds the pair or cell.
   VectorX blocked_from, blocked_step;

@@ -34,6 +34,7 @@ const char* to_string(Termination termination) {
 }
 
 void NewtonSummary::add_effort(const NewtonSummary& other) {
+  if (iterations == 0) linear_residual = other.linear_residual;
   iterations += other.iterations;
   indefinite += other.indefinite;
   blocked += other.blocked;
@@ -45,7 +46,6 @@ void NewtonSummary::add_effort(const NewtonSummary& other) {
   linear_seconds += other.linear_seconds;
   line_search_seconds += other.line_search_seconds;
   ccd_seconds += other.ccd_seconds;
-  linear_residual = std::max(linear_residual, other.linear_residual);
 }
 
 }  // namespace itr

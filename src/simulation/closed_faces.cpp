@@ -100,10 +100,11 @@ double coincidence(const Mesh<Dim>& mesh) {
 
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
-  if (!setup.contact.enabled || setup.proxy) return;
+  if (setup.proxy) return;
   const CellSet<Dim> cells = setup.ties.empty() ? CellSet<Dim>() : whole_mesh(mesh, {});
   for (const auto& mortar : mortars_of(setup, mesh, cells))
     for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
+  if (!setup.contact.enabled) return;
   std::vector<char> bonded(mesh.num_vertices(), 0);
   for (VertexId v = 0; v < mesh.num_vertices(); ++v) bonded[v] = mesh.steps_apart(v) == 0;
   const std::vector<char> all(mesh.num_nodes(), 1);

@@ -18,8 +18,8 @@ bool has_closed_faces(const Mesh<Dim>& mesh, int age = 0);
 template <int Dim>
 double coincidence(const Mesh<Dim>& mesh);
 
-/// Closes the faces of bodies that coincide at rest, and those that ties bond; does nothing where a proxy touches in their
-/// place, or without contact.
+/// Closes the faces that ties bond, and with contact those of bodies that coincide at rest; does nothing where a proxy
+/// touches in their place.
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh);
 

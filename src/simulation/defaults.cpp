@@ -31,8 +31,8 @@ constexpr double kDhatByThickness = 1e-3;  ///< of what surfaces stand off, litt
 /// curved edges and remeshing, which resolve contact as far as dhat does, would cost too much.
 constexpr double kDhatByThicknessIfPressed = 2e-4;
 constexpr double kDhatByEdge = 0.1, kDhatByGap = 0.9;
-constexpr double kLeastDhat = 0.01;       ///< of that without the gap: what nearly touches presses a little at the start
-constexpr double kDhatByOverlap = 0.002;  ///< of the overlap that is resolved, as long as that leaves kLeastByOverlap
+constexpr double kLeastDhat = 0.01;        ///< of that without the gap: what nearly touches presses a little at the start
+constexpr double kDhatByOverlap = 0.0005;  ///< of the overlap that is resolved, as long as that leaves kLeastByOverlap
 constexpr double kLeastByOverlap = 1e-3;
 constexpr double kDhatByMotion = 0.01;    ///< of the way that is prescribed without inertia
 constexpr double kDhatByGrowth = 0.0025;  ///< of what eigenstrains change of a thickness: it gives little interference
@@ -342,7 +342,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   std::vector<std::string> words;
   ContactOptions& contact = this->contact;
   RemeshOptions& remesh = this->remesh;
-  if (contact.enabled && !this->ties.empty()) contact.tie_reach = tie_reach(*this);
+  if (!this->ties.empty()) contact.tie_reach = tie_reach(*this);
   if (has_rigid_bodies(this->materials)) choose_rigid_moduli(*this);
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));

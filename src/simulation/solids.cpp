@@ -13,6 +13,7 @@
 #include "geometry/measures.hpp"
 #include "mesh/cell_of_facet.hpp"
 #include "sizes.hpp"
+#include "step_terms.hpp"
 
 namespace itr {
 
@@ -70,6 +71,21 @@ std::array<double, Dim> nearest_weights(const Vec<Dim>& p, const std::array<Vec<
   return weights;
 }
 
+/// Whether conditions hold a point and a facet along `way`, as on a plane of symmetry that cuts both bodies.
+template <int Dim>
+bool are_held(const Solid<Dim>& one, const FacetPoint<Dim>& point, const Solid<Dim>& other,
+              const std::array<int, Dim>& facet, const Vec<Dim>& way) {
+  constexpr double kAlong = 1e-9;
+  for (int c = 0; c < Dim; ++c) {
+    if (std::abs(way[c]) <= kAlong) continue;
+    for (int k = 0; k < Dim; ++k)
+      if ((point.weights[k] != 0 && !one.held.contains(Dim * point.vertices[k] + c)) ||
+          !other.held.contains(Dim * facet[k] + c))
+        return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -86,8 +102,15 @@ std::vector<Solid<Dim>> find_solids(const StepSetup<Dim>& setup, const Mesh<Dim>
   }
   for (std::size_t i = 0; i < boundary.facets.size(); ++i)
     by_part.at(mesh.part(cell_of_facet(mesh, boundary.parents[i]))).facets.push_back(boundary.facets[i]);
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0).held;
   std::vector<Solid<Dim>> solids;
-  for (auto& [part, solid] : by_part) solids.push_back(std::move(solid));
+  for (auto& [part, solid] : by_part) {
+    for (const auto& facet : solid.facets)
+      for (const int v : facet)
+        for (int k = Dim * v; v < mesh.num_nodes() && k < Dim * (v + 1); ++k)
+          if (held[static_cast<std::size_t>(k)]) solid.held.insert(k);
+    solids.push_back(std::move(solid));
+  }
   const Obstacles<Dim>& obstacles = setup.obstacles;
   const int first = mesh.num_nodes() + static_cast<int>(boundary.points.size());
   const auto facets = facets_of_obstacles(obstacles);
@@ -151,7 +174,7 @@ double Solids<Dim>::find_side(std::size_t i, std::size_t j) const {
   int inside = 0, outside = 0;
   for (const FacetPoint<Dim>& point : one.points) {
     const Vec<Dim> p = point.at(y_);
-    const bool is_inside = shapes_[j].closed ? shapes_[j].closed->winding(p) != 0 : find_nearest(j, p).gap < 0;
+    const bool is_inside = shapes_[j].closed ? shapes_[j].closed->winding(p) != 0 : find_nearest(i, point, j).gap < 0;
     ++(is_inside ? inside : outside);
   }
   return inside > outside ? -1 : 1;
@@ -159,14 +182,16 @@ double Solids<Dim>::find_side(std::size_t i, std::size_t j) const {
 
 /// Where several facets are equally near, the one whose plane is farthest from p tells the side.
 template <int Dim>
-Nearest<Dim> Solids<Dim>::find_nearest(std::size_t j, const Vec<Dim>& p) const {
-  constexpr double kEqual = 1e-9;
+Nearest<Dim> Solids<Dim>::find_nearest(std::size_t i, const FacetPoint<Dim>& point, std::size_t j) const {
+  constexpr double kEqual = 1e-9, kFarthest = 4;
   const Shape& shape = shapes_[j];
-  const double size = (shape.box.max - shape.box.min).norm();
+  const Vec<Dim> p = point.at(y_);
+  const double size = (shape.box.max - shape.box.min).norm(), farthest = kFarthest * (size + (p - shape.box.min).norm());
   Nearest<Dim> nearest;
   double least = std::numeric_limits<double>::infinity(), steepest = -1;
   std::vector<int> hits;
-  for (double reach = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach); reach *= 4) {
+  for (double reach = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach) && reach < farthest;
+       reach *= 4) {
     hits.clear();
     shape.tree.query(Box<Dim>{p, p}.inflated(reach), hits);
     for (const int f : hits) {
@@ -176,6 +201,7 @@ Nearest<Dim> Solids<Dim>::find_nearest(std::size_t j, const Vec<Dim>& p) const {
       const Vec<Dim> way = p - foot.at(y_), outward = -inward_normal(corners).normalized();
       const double distance = way.norm(), height = outward.dot(way);
       const double slope = distance > 0 ? std::abs(height) / distance : 1;
+      if (are_held<Dim>(solids_[i], point, solids_[j], facet, outward)) continue;
       const double slack = kEqual * (least < size ? least : 0) + 1e-15 * size;
       if (distance > least + slack || (distance >= least - slack && slope <= steepest)) continue;
       least = std::min(least, distance);
@@ -189,8 +215,10 @@ Nearest<Dim> Solids<Dim>::find_nearest(std::size_t j, const Vec<Dim>& p) const {
 }
 
 template <int Dim>
-std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, std::size_t j, const Vec<Dim>& p, double gap) const {
+std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, const FacetPoint<Dim>& point, std::size_t j,
+                                                   double gap) const {
   const Shape& shape = shapes_[j];
+  const Vec<Dim> p = point.at(y_);
   const double side = side_of(i, j);
   const double margin = shape.closed ? gap : std::max(gap, std::min(solids_[i].thickness, solids_[j].thickness));
   if (side > 0 && !shape.box.inflated(margin).contains(p)) return std::nullopt;
@@ -199,7 +227,7 @@ std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, std::size_t j,
     shape.tree.query(Box<Dim>{p, p}.inflated(gap), hits);
     if (hits.empty()) return std::nullopt;
   }
-  Nearest<Dim> nearest = find_nearest(j, p);
+  Nearest<Dim> nearest = find_nearest(i, point, j);
   nearest.gap *= side;
   nearest.normal *= side;
   if (nearest.gap < gap) return nearest;
@@ -214,10 +242,10 @@ std::vector<Penetration<Dim>> Solids<Dim>::penetrations() const {
       if (side_of(i, j) == 0) continue;
       Penetration<Dim> penetration{i, j, 0, Vec<Dim>::Zero(), true};
       for (const FacetPoint<Dim>& point : solids_[i].points) {
-        const Vec<Dim> p = point.at(y_);
-        const auto nearest = find_near(i, j, p, 0);
+        const auto nearest = find_near(i, point, j, 0);
         if (!nearest) penetration.is_whole = false;
-        if (nearest && -nearest->gap > penetration.depth) penetration.depth = -nearest->gap, penetration.place = p;
+        if (nearest && -nearest->gap > penetration.depth)
+          penetration.depth = -nearest->gap, penetration.place = point.at(y_);
       }
       if (penetration.depth > 0) found.push_back(penetration);
     }
@@ -233,7 +261,8 @@ std::optional<Vec<Dim>> Solids<Dim>::find_crossing_obstacles() const {
       const Box<Dim>& box = shapes_[j].box;
       for (const FacetPoint<Dim>& point : solids_[i].points) {
         const Vec<Dim> p = point.at(y_);
-        if (!solids_[i].is_flat && box.contains(p) && find_nearest(j, p).gap < -kTouching * (box.max - box.min).norm())
+        if (!solids_[i].is_flat && box.contains(p) &&
+            find_nearest(i, point, j).gap < -kTouching * (box.max - box.min).norm())
           return p;
       }
     }

@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "fem/chord_levels.hpp"
@@ -35,6 +36,7 @@ struct Solid {
   double thickness = std::numeric_limits<double>::infinity();  ///< of its thinnest body [m]
   std::vector<std::array<int, Dim>> facets;  ///< vertices of the contact surface; those of bodies are oriented outward
   std::vector<FacetPoint<Dim>> points;       ///< of these: corners, middles of edges, and in 3D of facets
+  std::set<int> held;                        ///< coordinates of bodies' vertices that conditions hold
 };
 
 /// The solids of a setup whose contact surface has no proxy.
@@ -45,8 +47,8 @@ std::vector<Solid<Dim>> find_solids(const StepSetup<Dim>& setup, const Mesh<Dim>
 template <int Dim>
 struct Nearest {
   FacetPoint<Dim> foot;
-  Vec<Dim> normal;  ///< of length 1: the way out
-  double gap = 0;   ///< negative inside [m]
+  Vec<Dim> normal;                                       ///< of length 1: the way out
+  double gap = std::numeric_limits<double>::infinity();  ///< negative inside [m]
 };
 
 /// How deep points of one solid are in another.
@@ -80,7 +82,7 @@ class Solids {
       for (std::size_t j = 0; j < solids_.size(); ++j)
         if (const double side = side_of(i, j); side != 0)
           for (const FacetPoint<Dim>& point : solids_[i].points)
-            if (const auto nearest = find_near(i, j, point.at(y_), gap)) visit(point, *nearest);
+            if (const auto nearest = find_near(i, point, j, gap)) visit(point, *nearest);
   }
 
  private:
@@ -94,8 +96,9 @@ class Solids {
   /// On which side of the solid j the solid i has to be: 1 outside, -1 inside, 0 where nothing is asked.
   double side_of(std::size_t i, std::size_t j) const { return sides_[i * solids_.size() + j]; }
   double find_side(std::size_t i, std::size_t j) const;
-  std::optional<Nearest<Dim>> find_near(std::size_t i, std::size_t j, const Vec<Dim>& p, double gap) const;
-  Nearest<Dim> find_nearest(std::size_t j, const Vec<Dim>& p) const;
+  std::optional<Nearest<Dim>> find_near(std::size_t i, const FacetPoint<Dim>& point, std::size_t j, double gap) const;
+  /// Finds where a point of the solid i is from j; facets that conditions hold in one plane with it are no way out.
+  Nearest<Dim> find_nearest(std::size_t i, const FacetPoint<Dim>& point, std::size_t j) const;
 
   VectorX y_;
   std::vector<Solid<Dim>> solids_;
