@@ -11,6 +11,8 @@
 #include "derivatives.hpp"
 #include "energy/contact/contact.hpp"
 #include "energy/elastic/elastic.hpp"
+#include "energy/elastic/law_table.hpp"
+#include "energy/elastic/patched_volume.hpp"
 #include "energy/elastic/turned.hpp"
 #include "energy/inertia.hpp"
 #include "energy/load.hpp"
@@ -83,6 +85,35 @@ TEST(Axisymmetry, DerivativesOfAllLawsMatchDifferences) {
         const VectorX gradient = gradient_of(elastic, x);
         EXPECT_NEAR(sum<2>(gradient)[1], 0, 1e-13 * gradient.lpNorm<1>());
       }
+}
+
+/// Nearly incompressible bodies average J over the full turn.
+TEST(Axisymmetry, PatchesHaveDerivativesAndKeepHomogeneousStates) {
+  std::mt19937 random(11);
+  for (Material material : all_laws()) {
+    if (!may_average_volume(material, 3)) continue;
+    SCOPED_TRACE(name_of(material));
+    material.volume = VolumeForm::patches;
+    const Vec<3> stretches(0.8, 1.3, 0.8);
+    const double W = elastic_density<3>(Mat<3>(stretches.asDiagonal()), elastic_moduli<3>(material, Vec<3>(Vec<3>::Zero())));
+    for (const double inner : {0.0, 0.3})
+      for (const int curves : {0, 1, 2}) {
+        const Mesh<2> mesh = random_cylinder(random, inner, curves);
+        CellSet<2> cells = whole_mesh(mesh, {});
+        add_patches({{1, material}}, cells);
+        double volume = 0;
+        for (const double of_patch : cells.patches->volume) volume += of_patch;
+        EXPECT_NEAR(volume, kPi * (1 - inner * inner), 1e-12);
+        const ElasticEnergy<2> elastic(cells, {{1, material}}, 0.3);
+        VectorX x = rest_positions(mesh);
+        for (Eigen::Index i = 0; i < x.size(); ++i) x[i] *= stretches[i % 2];
+        Workspace workspace;
+        EXPECT_NEAR(elastic.value(x, workspace), 0.3 * volume * W, 1e-12 * volume * W);
+        x = perturbed(mesh, random, 0.03);
+        expect_derivatives(elastic, x, 1e-6, 1e-6);
+        expect_psd(elastic, x);
+      }
+  }
 }
 
 TEST(Axisymmetry, DerivativesOfOtherTermsMatchDifferences) {

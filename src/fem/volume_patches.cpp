@@ -7,6 +7,9 @@
 #include <tuple>
 #include <utility>
 
+#include "fem/cell_set.hpp"
+#include "fem/quadrature.hpp"
+
 namespace itr {
 
 namespace {
@@ -132,6 +135,15 @@ class PatchBuilder {
     return !adopted.empty();
   }
 
+  /// Integrates the weight of a part of an element over the full turn: weights and radii are linear.
+  double turned_volume(int e, int part) const {
+    const auto& element = cells_.elements[e];
+    double sum = 0;
+    for (const auto& point : quadrature<Dim>(2))
+      sum += point.fraction * patches_->weight(e, part, point.weights) *
+             cells_.turn(rest_position<Dim>(cells_, element, point.weights));
+    return element.volume * sum;
+  }
   /// Sets the volumes, and renumbers patches that have some.
   void drop_empty() {
     std::vector<double> volume(patches_->body.size(), 0.0);
@@ -139,7 +151,8 @@ class PatchBuilder {
       if (left_of(e) == 0) star(e) = kNone;
       for (int part = 0; part <= kLeft; ++part)
         if (const int patch = patches_->patch_of[e][part]; patch != kNone)
-          volume[patch] += cells_.elements[e].volume * (part == kLeft ? left_of(e) : 1) / (Dim + 1);
+          volume[patch] += cells_.axisymmetric ? turned_volume(e, part)
+                                               : cells_.elements[e].volume * (part == kLeft ? left_of(e) : 1) / (Dim + 1);
     }
     std::vector<int> number(volume.size(), kNone), body;
     patches_->volume.clear();

@@ -316,8 +316,7 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   // Quadratic tetrahedra do without: their patches have 65 nodes, which takes several times as long at equal error.
   const Node order = root["space"]["discr_order"];
   const bool is_cheap = Dim == 2 || !order.exists() || order.json() == 1;
-  const bool has_patches =
-      averages_volume(root) && is_cheap && !root["space"]["remesh"]["enabled"].boolean(false) && !is_axisymmetric(root);
+  const bool has_patches = averages_volume(root) && is_cheap && !root["space"]["remesh"]["enabled"].boolean(false);
   const int space = is_axisymmetric(root) ? 3 : Dim;
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id

@@ -131,10 +131,12 @@ struct FrameCells {
                               in_space(point).first);
   }
   /// Mean energy density of the patches in an element.
-  double density(const typename CellSet<Dim>::Element& element) const {
+  double density(const typename CellSet<Dim>::Element& element, std::span<const CellPoint<Dim>> points) const {
     double sum = 0;
     std::array<double, Dim + 1> middle;  // where linear weights are their means
-    middle.fill(1.0 / (Dim + 1));
+    middle.fill(cells.axisymmetric ? 0 : 1.0 / (Dim + 1));
+    for (std::size_t k = 0; cells.axisymmetric && k <= Dim; ++k)
+      for (const CellPoint<Dim>& point : points) middle[k] += point.fraction * point.weights[k];
     const auto e = static_cast<int>(number(element));
     for (int part = 0; cells.patches && part < VolumePatches<Dim>::kParts; ++part)
       if (const int patch = cells.patches->patch_of[e][part]; patch != kNone)
@@ -231,10 +233,6 @@ Vec<3> stretches_of(const Mat<Dim>& F, double across) {
   return stretches;
 }
 
-Mat<3> stress_in_space(const Material& material, const Mat<3>& F, const Vec<3>& X) {
-  return elastic_stress<3>(F, elastic_moduli<3>(material, X)) * F.transpose() / F.determinant();
-}
-
 template <int Dim>
 double out_of_plane_stress(const Material& material, const ElasticModuli& moduli, const Mat<Dim>& F) {
   if (Dim == 3 || !material.plane_strain || (sum_of(material) && sum_of(material)->dimension == 2)) return 0;
@@ -262,17 +260,17 @@ CellStress stress_of(const FrameCells<Dim>& frame, const VectorX& x, const Quadr
     Vec<3> stretches = Vec<3>::Zero();
     for (const CellPoint<Dim>& point : points) {
       const Mat<Dim>& F = point.F;
+      const ElasticModuli moduli = frame.moduli(material, element, point);
+      const Mat<3> past = frame.past(material, element, point).first;
       if (point.hoop != 0) {
-        const auto [F3, X3] = in_space(point);
-        const Mat<3> here = stress_in_space(material, F3, X3) + frame.past(material, element, point).first;
+        const Mat<3> F3 = in_space(point).first;
+        const Mat<3> here = elastic_stress<3>(F3, moduli) * F3.transpose() / F3.determinant() + past;
         cauchy += point.fraction * here.template topLeftCorner<Dim, Dim>();
         equivalent += point.fraction * von_mises<3>(here, 0);
         pressure -= point.fraction * here.trace() / 3;
         stretches += point.fraction * stretches_of<Dim>(F, point.hoop);
         continue;
       }
-      const ElasticModuli moduli = frame.moduli(material, element, point);
-      const Mat<3> past = frame.past(material, element, point).first;
       const Mat<Dim> here = elastic_stress<Dim>(F, moduli) * F.transpose() / (F.determinant() * thickness<Dim>(F, moduli)) +
                             past.template topLeftCorner<Dim, Dim>();
       cauchy += point.fraction * here;
@@ -346,15 +344,12 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
   const CellSet<Dim>& cells = frame.cells;
   const auto add_density = [&](const auto& element, auto points) {
     const Material& material = frame.materials.at(element.body);
-    double mean = frame.density(element);
+    double mean = frame.density(element, points);
     for (const CellPoint<Dim>& point : points) {
       mean += point.fraction * frame.past(material, element, point).second;
-      if (point.hoop != 0) {
-        const auto [F3, X3] = in_space(point);
-        mean += point.fraction * elastic_density<3>(F3, elastic_moduli<3>(material, X3));
-      } else {
-        mean += point.fraction * elastic_density<Dim>(point.F, cell_moduli<Dim>(cells, material, point.X));
-      }
+      const ElasticModuli moduli = cell_moduli<Dim>(cells, material, point.X);
+      mean += point.fraction *
+              (point.hoop != 0 ? elastic_density<3>(in_space(point).first, moduli) : elastic_density<Dim>(point.F, moduli));
     }
     if (element.curved && !cells.axisymmetric)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -95,6 +96,8 @@ class LaggedSolve {
     RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
     std::optional<Lagged> now;  // what is lagged at x, where the last round made it
     Relaxation relaxation;
+    Mixing mixing;
+    VectorX pressed_x = lagged_x;  // where pressure is lagged
     const auto solve_again = [&] {
       regularized_about_ = x;
       NewtonSummary next = minimize_lagged(x);
@@ -152,6 +155,10 @@ class LaggedSolve {
       }
       if (previous.size() == kLongestCycle) previous.erase(previous.begin());
       previous.push_back(x);
+      if (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)) {
+        pressed_x = mixing.next(pressed_x, x);
+        next_lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_.loads, pressed_x, terms_.scaling);
+      }
       if (factor != 1) next_lagged.friction_of_surface->relax(*lagged_.friction_of_surface, factor);
       lagged_ = std::move(next_lagged);
       loose_force_ = round < std::min(kLooseRounds, rounds - 1) ? asked_of_round(residual) : 0;

@@ -2,6 +2,7 @@
 // Rounds in which a step is solved again with what was lagged at the solution before: how they end, and how far they go.
 #pragma once
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <optional>
 #include <string_view>
@@ -47,6 +48,36 @@ class Relaxation {
  private:
   VectorX last_;  ///< residual
   double factor_ = 1;
+};
+
+/// Anderson's mixing of rounds: of the combinations of earlier rounds it takes that with the least residual, were all linear
+/// (Walker & Ni 2011). Where loads exceed stiffness, plain rounds go farther and farther off.
+class Mixing {
+ public:
+  /// The positions at which to lag in the next round, after one that was lagged at `lagged` and has led to `now`.
+  VectorX next(const VectorX& lagged, const VectorX& now) {
+    constexpr std::size_t kMostRounds = 10;
+    constexpr double kFast = 0.5;  ///< of the residual before: rounds that come to less need no mixing
+    const VectorX residual = now - lagged;
+    const bool is_fast = !residuals_.empty() && residual.norm() < kFast * residuals_.back().norm();
+    if (residuals_.size() == kMostRounds) {
+      residuals_.erase(residuals_.begin());
+      images_.erase(images_.begin());
+    }
+    residuals_.push_back(residual);
+    images_.push_back(now);
+    const auto rounds = static_cast<Eigen::Index>(residuals_.size()) - 1;
+    if (rounds == 0 || is_fast) return now;
+    MatrixX changes(now.size(), rounds), of_images(now.size(), rounds);
+    for (Eigen::Index k = 0; k < rounds; ++k) {
+      changes.col(k) = residual - residuals_[static_cast<std::size_t>(k)];
+      of_images.col(k) = now - images_[static_cast<std::size_t>(k)];
+    }
+    return now - of_images * changes.colPivHouseholderQr().solve(residual);
+  }
+
+ private:
+  std::vector<VectorX> residuals_, images_;  ///< newest last
 };
 
 /// Whether rounds that reached x, after `previous` (newest last), are over. Lagging need not converge: it can go round in

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -18,6 +19,7 @@
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "long_steps.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "mesh_figures.hpp"
 #include "resolution.hpp"
 #include "simulation/barrier_stiffness.hpp"
@@ -275,6 +277,19 @@ void find_loose_bodies(const Setup<Dim>& setup, std::vector<std::string>& found)
                                                        "not keep them from sliding off"));
 }
 
+/// By body, the surface of which all vertices are held in all directions [m^(Dim-1)].
+template <int Dim>
+std::map<int, double> bonded_surfaces(const Setup<Dim>& setup) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0 + setup.time.dt).held;
+  std::map<int, double> surfaces;
+  for (const FacetId f : mesh.live_facets()) {
+    const auto is_held = [&](int v) { return std::all_of(&held[Dim * v], &held[Dim * v] + Dim, std::identity()); };
+    if (std::ranges::all_of(mesh.facet(f), is_held)) surfaces[mesh.body(cell_of_facet(mesh, f))] += facet_measure(mesh, f);
+  }
+  return surfaces;
+}
+
 /// Linear elements that are too stiff: nearly incompressible bodies, and thin ones with few cells through the thickness.
 template <int Dim>
 void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
@@ -282,7 +297,9 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
   // Beams of n layers of linear triangles bend too little: forces are off by 3.3 / n^2, and remeshing makes the layers
   // finer.
   constexpr double kOfLayers = 3.3;
+  constexpr double kBonded = 0.4;  // of the surface: such a body does not bend
   const double few_layers = setup.remesh.enabled ? 3 : 8;
+  std::map<int, double> bonded = bonded_surfaces(setup);
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (rigid_body_of(material)) continue;
@@ -295,7 +312,8 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
         "compare";
     const bool keeps_volume =
         (Dim == 3 || material.plane_strain || setup.mesh.is_axisymmetric()) && material.volume == VolumeForm::pointwise;
-    const bool is_thin = size.thickness < kSlender * size.diagonal && layers < few_layers;
+    const bool is_thin =
+        size.thickness < kSlender * size.diagonal && layers < few_layers && bonded[body] < kBonded * size.surface;
     if (setup.remesh.enabled) {
       if (is_thin)
         found.push_back(
@@ -310,11 +328,12 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
             "with a fixed mesh, where volumes are averaged over patches (/materials/*/volume)",
             name, material.poisson_ratio));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
-      found.push_back(
-          fmt::format("body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
-                      "lock, forces are too large, often several times; {}{}",
-                      name, material.poisson_ratio, layers,
-                      may_average_volume(material, Dim) ? "patches (/materials/*/volume), " : "", help));
+      found.push_back(fmt::format(
+          "body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
+          "lock, forces are too large, often several times; {}{}",
+          name, material.poisson_ratio, layers,
+          may_average_volume(material, setup.mesh.is_axisymmetric() ? 3 : Dim) ? "patches (/materials/*/volume), " : "",
+          help));
     else if (is_thin)
       found.push_back(
           fmt::format("body {}: thin, with about {:.2g} linear elements through its thickness: where it bends, forces are "

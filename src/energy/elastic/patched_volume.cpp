@@ -10,6 +10,7 @@
 #include "fem/volume_patches.hpp"
 #include "geometry/cofactors.hpp"
 #include "strain.hpp"
+#include "turned.hpp"
 
 namespace itr {
 
@@ -17,8 +18,8 @@ namespace {
 
 constexpr std::size_t kElements = 256, kPatches = 64;  ///< of a task
 
-template <int Dim>
-double volume_change(const Mat<Dim>& G) {
+template <typename Gradient>
+double volume_change(const Gradient& G) {
   return G.trace() + sum_of_minors(G);
 }
 
@@ -39,7 +40,9 @@ PatchedVolume<Dim>::PatchedVolume(const CellSet<Dim>& cells, const std::map<int,
                                   RuleOf rule_of)
     : cells_(cells), scale_(scale), rule_of_(std::move(rule_of)) {
   for (const auto& [body, material] : materials)
-    if (material.volume == VolumeForm::patches) whole_[body] = elastic_moduli<Dim>(material, Vec<Dim>::Zero());
+    if (material.volume == VolumeForm::patches)
+      whole_[body] =
+          cells.axisymmetric ? elastic_moduli<3>(material, Vec<3>::Zero()) : elastic_moduli<Dim>(material, Vec<Dim>::Zero());
 }
 
 template <int Dim>
@@ -54,20 +57,17 @@ std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) cons
       if (e < straight) {
         Mat<Dim> edges;
         for (int k = 0; k < Dim; ++k) edges.col(k) = u.difference(element.vertices[0], element.vertices[k + 1]);
-        of_element[e].back() = element.volume * volume_change<Dim>(edges * element.inverse_edges);
+        of_element[e].back() = element.volume * volume_change(Mat<Dim>(edges * element.inverse_edges));
         continue;
       }
       of_element[e].fill(0);
-      Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> displacements;
-      const auto nodes = element.nodes();
-      for (int k = 0; k < kQuadraticNodes<Dim>; ++k) displacements.col(k) = u.difference(nodes[0], nodes[k]);
-      for (const auto& point : rule_of_(e - straight)) {
-        const double change = volume_change<Dim>(displacements * shape_gradients<Dim>(element, point.weights).transpose());
+      const NodalDisplacements<Dim> displacements(element, u);
+      for_each_site<Dim>(cells_, element, rule_of_(e - straight), [&](std::size_t, const auto& site) {
+        const double change = volume_change(site.displacement_gradient(displacements).G);
         for (int part = 0; part < kParts; ++part)
           if (patches.patch_of[e][part] != kNone)
-            of_element[e][part] +=
-                point.fraction * element.volume * patches.weight(static_cast<int>(e), part, point.weights) * change;
-      }
+            of_element[e][part] += site.weight(1) * patches.weight(static_cast<int>(e), part, site.point.weights) * change;
+      });
     }
   });
   std::vector<double> changes(patches.count());
@@ -124,13 +124,12 @@ VectorX PatchedVolume<Dim>::gradient_of(std::size_t patch, ConstVectorView x) co
     }
     const auto of_element = element.nodes();
     const auto positions = at_nodes<Dim>(of_element, x);
-    Eigen::Matrix<double, Dim, kQuadraticNodes<Dim>> forces;
-    forces.setZero();
-    for (const auto& point : rule_of_(static_cast<std::size_t>(e) - straight)) {
-      const auto gradients = shape_gradients<Dim>(element, point.weights);
-      const Mat<Dim> F = positions * gradients.transpose();
-      forces += point.fraction * element.volume * patches.weight(e, part, point.weights) * (cofactors(F) * gradients);
-    }
+    Nodal<Dim> forces = Nodal<Dim>::Zero();
+    for_each_site<Dim>(cells_, element, rule_of_(static_cast<std::size_t>(e) - straight),
+                       [&, e = e, part = part](std::size_t, const auto& site) {
+                         const double weight = site.weight(1) * patches.weight(e, part, site.point.weights);
+                         site.add_forces(weight, cofactors(site.deformation_gradient(positions)), forces);
+                       });
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k) add(of_element[k], forces.col(k));
   }
   return gradient;

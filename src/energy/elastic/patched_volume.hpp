@@ -58,11 +58,16 @@ struct PatchPressures {
   }
 };
 
-/// The law of a material in the elements: without U(J) if patches of the cells take that.
+/// The law of a material in the elements, in space where these are turned: without U(J) if patches of the cells take that.
 template <int Dim>
 ElasticModuli cell_moduli(const CellSet<Dim>& cells, const Material& material, const Vec<Dim>& X) {
+  const bool is_parted = cells.patches && material.volume == VolumeForm::patches;
+  if (cells.axisymmetric) {
+    const ElasticModuli whole = elastic_moduli<3>(material, Vec<3>(X[0], X[1], 0));
+    return is_parted ? without_volume<3>(whole) : whole;
+  }
   const ElasticModuli whole = elastic_moduli<Dim>(material, X);
-  return cells.patches && material.volume == VolumeForm::patches ? without_volume<Dim>(whole) : whole;
+  return is_parted ? without_volume<Dim>(whole) : whole;
 }
 
 /// Gives `cells` the patches of the bodies whose material asks for some.
@@ -88,12 +93,13 @@ class PatchedVolume {
   void add_hessian(ConstVectorView x, const std::vector<double>& changes, PsdProjection psd, HessianSink& sink) const;
   /// Derivative of W theta by the positions of the patch's nodes.
   VectorX gradient_of(std::size_t patch, ConstVectorView x) const;
-  /// U(theta) by patch [J/m^Dim].
+  /// U(theta) by patch [J/m^Dim, J/m^3 where cells are turned].
   std::vector<double> densities(const std::vector<double>& changes) const;
 
  private:
   VolumeResponse response(std::size_t patch, double change) const {
-    return volume_energy<Dim>(whole_.at(cells_.patches->body[patch]), change);
+    const ElasticModuli& whole = whole_.at(cells_.patches->body[patch]);
+    return cells_.axisymmetric ? volume_energy<3>(whole, change) : volume_energy<Dim>(whole, change);
   }
   const CellSet<Dim>& cells_;
   std::map<int, ElasticModuli> whole_;  ///< by body

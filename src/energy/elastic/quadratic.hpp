@@ -173,7 +173,7 @@ class QuadraticElasticity {
     bool varies = false;
     for (const auto& [body, material] : materials) {
       varies = varies || material.has_varying_moduli();
-      by_body_[body] = moduli_at(material, Vec<Dim>::Zero());
+      by_body_[body] = cell_moduli<Dim>(cells_, material, Vec<Dim>::Zero());
     }
     by_element_.reserve(elements_.size());
     for (const Element& element : elements_) by_element_.push_back(&by_body_.at(element.body));
@@ -278,11 +278,6 @@ class QuadraticElasticity {
                  const PatchPressures<Dim>& pressures) const {
     return pressures.in(moduli(e, point), first_ + e, site.point.weights);
   }
-  ElasticModuli moduli_at(const Material& material, const Vec<Dim>& X) const {
-    if constexpr (Dim == 2)
-      if (cells_.axisymmetric) return elastic_moduli<3>(material, Vec<3>(X[0], X[1], 0));
-    return cell_moduli<Dim>(cells_, material, X);
-  }
   double volume_of(const Element& element) const {
     return element.volume * cells_.turn(rest_barycenter<Dim>(cells_, element));
   }
@@ -294,17 +289,7 @@ class QuadraticElasticity {
   /// f(point's number, site) for the points of a cell that have a weight.
   template <typename F>
   void for_each_site(std::size_t e, const F& f) const {
-    const Element& element = elements_[e];
-    const auto& rule = this->rule(e);
-    for (std::size_t q = 0; q < rule.size(); ++q) {
-      if constexpr (Dim == 2)
-        if (cells_.axisymmetric) {
-          const ElasticSite<2, 3> site(cells_, element, rule[q]);
-          if (site.turn > 0) f(q, site);
-          continue;
-        }
-      f(q, ElasticSite<Dim, Dim>(cells_, element, rule[q]));
-    }
+    itr::for_each_site<Dim>(cells_, elements_[e], rule(e), f);
   }
   /// Sums share * volume * at_point(G, moduli) over all points, and the barriers.
   template <typename F>
@@ -380,9 +365,9 @@ class QuadraticElasticity {
       const Element& element = elements_[e];
       first_varying_.push_back(varying_.size());
       const Material& material = materials_.at(element.body);
-      at_barycenters_.push_back(moduli_at(material, rest_barycenter<Dim>(cells_, element)));
+      at_barycenters_.push_back(cell_moduli<Dim>(cells_, material, rest_barycenter<Dim>(cells_, element)));
       for (const auto& point : rule(e))
-        varying_.push_back(moduli_at(material, rest_position<Dim>(cells_, element, point.weights)));
+        varying_.push_back(cell_moduli<Dim>(cells_, material, rest_position<Dim>(cells_, element, point.weights)));
     }
   }
   /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.

@@ -76,6 +76,21 @@ struct ElasticSite {
   }
 };
 
+/// f(point's number, site) for the points of a cell's rule that have a weight: in space where the cells are turned.
+template <int Dim, typename F>
+void for_each_site(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
+                   const std::vector<QuadraturePoint<Dim>>& rule, const F& f) {
+  for (std::size_t q = 0; q < rule.size(); ++q) {
+    if constexpr (Dim == 2)
+      if (cells.axisymmetric) {
+        const ElasticSite<2, 3> site(cells, element, rule[q]);
+        if (site.turn > 0) f(q, site);
+        continue;
+      }
+    f(q, ElasticSite<Dim, Dim>(cells, element, rule[q]));
+  }
+}
+
 /// Keeps the radius of a turned cell above zero where it is above zero at rest. It is at least the least of its Bernstein
 /// coefficients, at vertices and on curved edges; with their ratios s_k to those at rest, of mean m, the barrier is
 ///   1/16 sum over k of phi(s_k / m),   phi that of JacobianBarrier.
