@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <utility>
 
 #include "core/connected_parts.hpp"
@@ -13,7 +12,6 @@
 #include "geometry/measures.hpp"
 #include "mesh/cell_of_facet.hpp"
 #include "sizes.hpp"
-#include "step_terms.hpp"
 
 namespace itr {
 
@@ -21,21 +19,28 @@ namespace {
 
 /// Corners, and middles of what has several of them.
 template <int Dim>
-std::vector<FacetPoint<Dim>> points_of(const std::vector<std::array<int, Dim>>& facets) {
-  std::set<std::array<int, 2>> seen;
-  std::vector<FacetPoint<Dim>> points;
-  for (const auto& facet : facets) {
+void set_points(Solid<Dim>& solid) {
+  std::map<std::array<int, 2>, std::size_t> number;
+  auto& points = solid.points;
+  for (std::size_t f = 0; f < solid.facets.size(); ++f) {
+    const auto& facet = solid.facets[f];
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j <= i; ++j) {
-        if (!seen.insert({std::min(facet[i], facet[j]), std::max(facet[i], facet[j])}).second) continue;
-        FacetPoint<Dim> point{facet, {}};
-        point.weights[i] += 0.5;
-        point.weights[j] += 0.5;
-        points.push_back(point);
+        const auto [place, is_new] =
+            number.emplace(std::array{std::min(facet[i], facet[j]), std::max(facet[i], facet[j])}, points.size());
+        if (is_new) {
+          FacetPoint<Dim>& point = points.emplace_back(facet);
+          point.weights[i] += 0.5;
+          point.weights[j] += 0.5;
+          solid.facets_at.emplace_back();
+        }
+        solid.facets_at[place->second].push_back(static_cast<int>(f));
       }
-    if constexpr (Dim == 3) points.push_back({facet, {1.0 / 3, 1.0 / 3, 1.0 / 3}});
+    if constexpr (Dim == 3) {
+      points.push_back({facet, {1.0 / 3, 1.0 / 3, 1.0 / 3}});
+      solid.facets_at.push_back({static_cast<int>(f)});
+    }
   }
-  return points;
 }
 
 template <int Dim>
@@ -71,21 +76,6 @@ std::array<double, Dim> nearest_weights(const Vec<Dim>& p, const std::array<Vec<
   return weights;
 }
 
-/// Whether conditions hold a point and a facet along `way`, as on a plane of symmetry that cuts both bodies.
-template <int Dim>
-bool are_held(const Solid<Dim>& one, const FacetPoint<Dim>& point, const Solid<Dim>& other,
-              const std::array<int, Dim>& facet, const Vec<Dim>& way) {
-  constexpr double kAlong = 1e-9;
-  for (int c = 0; c < Dim; ++c) {
-    if (std::abs(way[c]) <= kAlong) continue;
-    for (int k = 0; k < Dim; ++k)
-      if ((point.weights[k] != 0 && !one.held.contains(Dim * point.vertices[k] + c)) ||
-          !other.held.contains(Dim * facet[k] + c))
-        return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 template <int Dim>
@@ -102,15 +92,8 @@ std::vector<Solid<Dim>> find_solids(const StepSetup<Dim>& setup, const Mesh<Dim>
   }
   for (std::size_t i = 0; i < boundary.facets.size(); ++i)
     by_part.at(mesh.part(cell_of_facet(mesh, boundary.parents[i]))).facets.push_back(boundary.facets[i]);
-  const std::vector<char> held = held_dofs(setup, mesh, setup.time.t0).held;
   std::vector<Solid<Dim>> solids;
-  for (auto& [part, solid] : by_part) {
-    for (const auto& facet : solid.facets)
-      for (const int v : facet)
-        for (int k = Dim * v; v < mesh.num_nodes() && k < Dim * (v + 1); ++k)
-          if (held[static_cast<std::size_t>(k)]) solid.held.insert(k);
-    solids.push_back(std::move(solid));
-  }
+  for (auto& [part, solid] : by_part) solids.push_back(std::move(solid));
   const Obstacles<Dim>& obstacles = setup.obstacles;
   const int first = mesh.num_nodes() + static_cast<int>(boundary.points.size());
   const auto facets = facets_of_obstacles(obstacles);
@@ -123,7 +106,7 @@ std::vector<Solid<Dim>> find_solids(const StepSetup<Dim>& setup, const Mesh<Dim>
   }
   for (const int v : obstacles.flats) by_component[connected[v]].is_flat = true;
   for (auto& [component, solid] : by_component) solids.push_back(std::move(solid));
-  for (Solid<Dim>& solid : solids) solid.points = points_of<Dim>(solid.facets);
+  for (Solid<Dim>& solid : solids) set_points(solid);
   return solids;
 }
 
@@ -158,6 +141,7 @@ void Solids<Dim>::make_shapes() {
       shape.box.include(boxes.back());
     }
     shape.tree.build(boxes);
+    for (const auto& facet : solid.facets) shape.normals.push_back(-inward_normal(corners_of<Dim>(facet, y_)).normalized());
     ClosedSurface<Dim> closed(std::move(corners), facets);
     if (std::ranges::all_of(facets, [&](const auto& facet) { return closed.is_vertex(facet[0]); })) shape.closed = closed;
   }
@@ -172,53 +156,86 @@ double Solids<Dim>::find_side(std::size_t i, std::size_t j) const {
   if (!shapes_[i].box.inflated(near).overlaps(shapes_[j].box)) return 0;
   if (are_bodies || other.part != kNone) return 1;
   int inside = 0, outside = 0;
-  for (const FacetPoint<Dim>& point : one.points) {
-    const Vec<Dim> p = point.at(y_);
-    const bool is_inside = shapes_[j].closed ? shapes_[j].closed->winding(p) != 0 : find_nearest(i, point, j).gap < 0;
+  for (std::size_t k = 0; k < one.points.size(); ++k) {
+    const bool is_inside =
+        shapes_[j].closed ? shapes_[j].closed->winding(one.points[k].at(y_)) != 0 : find_nearest(i, k, j).gap < 0;
     ++(is_inside ? inside : outside);
   }
   return inside > outside ? -1 : 1;
 }
 
-/// Where several facets are equally near, the one whose plane is farthest from p tells the side.
 template <int Dim>
-Nearest<Dim> Solids<Dim>::find_nearest(std::size_t i, const FacetPoint<Dim>& point, std::size_t j) const {
-  constexpr double kEqual = 1e-9, kFarthest = 4;
+bool Solids<Dim>::is_facing(std::size_t i, std::size_t point, std::size_t j, int facet) const {
+  constexpr double kFacing = -0.1;  // of the cosine of their normals
+  if (solids_[i].part == kNone || solids_[j].part == kNone) return true;
+  const auto faces = [&](int f) { return shapes_[i].normals[f].dot(shapes_[j].normals[facet]) < kFacing; };
+  return std::ranges::any_of(solids_[i].facets_at[point], faces);
+}
+
+/// Where several facets are equally near, one that faces the point, and of these the one whose plane is farthest from it,
+/// tells the side.
+template <int Dim>
+Nearest<Dim> Solids<Dim>::find_nearest(std::size_t i, std::size_t point, std::size_t j) const {
+  constexpr double kEqual = 1e-9;
   const Shape& shape = shapes_[j];
-  const Vec<Dim> p = point.at(y_);
-  const double size = (shape.box.max - shape.box.min).norm(), farthest = kFarthest * (size + (p - shape.box.min).norm());
+  const Vec<Dim> p = solids_[i].points[point].at(y_);
+  const double size = (shape.box.max - shape.box.min).norm();
   Nearest<Dim> nearest;
-  double least = std::numeric_limits<double>::infinity(), steepest = -1;
+  double least = std::numeric_limits<double>::infinity(), best = -1;
   std::vector<int> hits;
-  for (double reach = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach) && reach < farthest;
-       reach *= 4) {
+  for (double reach = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach); reach *= 4) {
     hits.clear();
     shape.tree.query(Box<Dim>{p, p}.inflated(reach), hits);
     for (const int f : hits) {
       const auto& facet = solids_[j].facets[f];
-      const auto corners = corners_of<Dim>(facet, y_);
-      const FacetPoint<Dim> foot{facet, nearest_weights<Dim>(p, corners)};
-      const Vec<Dim> way = p - foot.at(y_), outward = -inward_normal(corners).normalized();
-      const double distance = way.norm(), height = outward.dot(way);
-      const double slope = distance > 0 ? std::abs(height) / distance : 1;
-      if (are_held<Dim>(solids_[i], point, solids_[j], facet, outward)) continue;
+      const FacetPoint<Dim> foot{facet, nearest_weights<Dim>(p, corners_of<Dim>(facet, y_))};
+      const Vec<Dim> way = p - foot.at(y_);
+      const double distance = way.norm(), height = shape.normals[f].dot(way);
+      const bool faces = is_facing(i, point, j, f);
+      const double rank = (distance > 0 ? std::abs(height) / distance : 1) + (faces ? 1 : 0);
       const double slack = kEqual * (least < size ? least : 0) + 1e-15 * size;
-      if (distance > least + slack || (distance >= least - slack && slope <= steepest)) continue;
+      if (distance > least + slack || (distance >= least - slack && rank <= best)) continue;
       least = std::min(least, distance);
-      steepest = slope;
+      best = rank;
       const bool is_inside = shape.closed ? shape.closed->winding(p) != 0 : height < 0;
       const double sign = is_inside ? -1 : 1;
-      nearest = {foot, distance > 1e-12 * size ? Vec<Dim>(sign * way / distance) : outward, sign * distance};
+      nearest = {foot, distance > 1e-12 * size ? Vec<Dim>(sign * way / distance) : shape.normals[f], sign * distance,
+                 faces ? Nearest<Dim>::Way::out : Nearest<Dim>::Way::beside};
     }
   }
   return nearest;
 }
 
 template <int Dim>
-std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, const FacetPoint<Dim>& point, std::size_t j,
-                                                   double gap) const {
+Nearest<Dim> Solids<Dim>::find_facing(std::size_t i, std::size_t point, std::size_t j, double gap) const {
   const Shape& shape = shapes_[j];
-  const Vec<Dim> p = point.at(y_);
+  const Vec<Dim> p = solids_[i].points[point].at(y_);
+  const double farthest = std::min(solids_[i].thickness, solids_[j].thickness);
+  Nearest<Dim> nearest;
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<int> hits;
+  for (double reach = farthest / 1024; !(least <= reach) && reach <= farthest; reach *= 4) {
+    hits.clear();
+    shape.tree.query(Box<Dim>{p, p}.inflated(reach), hits);
+    for (const int f : hits) {
+      if (!is_facing(i, point, j, f)) continue;
+      const auto& facet = solids_[j].facets[f];
+      const FacetPoint<Dim> foot{facet, nearest_weights<Dim>(p, corners_of<Dim>(facet, y_))};
+      const Vec<Dim> way = p - foot.at(y_);
+      if (way.norm() >= least) continue;
+      least = way.norm();
+      const double height = shape.normals[f].dot(way);
+      const bool is_before = (way - height * shape.normals[f]).norm() <= gap;
+      nearest = {foot, shape.normals[f], height, is_before ? Nearest<Dim>::Way::beside : Nearest<Dim>::Way::none};
+    }
+  }
+  return nearest;
+}
+
+template <int Dim>
+std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, std::size_t point, std::size_t j, double gap) const {
+  const Shape& shape = shapes_[j];
+  const Vec<Dim> p = solids_[i].points[point].at(y_);
   const double side = side_of(i, j);
   const double margin = shape.closed ? gap : std::max(gap, std::min(solids_[i].thickness, solids_[j].thickness));
   if (side > 0 && !shape.box.inflated(margin).contains(p)) return std::nullopt;
@@ -230,8 +247,27 @@ std::optional<Nearest<Dim>> Solids<Dim>::find_near(std::size_t i, const FacetPoi
   Nearest<Dim> nearest = find_nearest(i, point, j);
   nearest.gap *= side;
   nearest.normal *= side;
-  if (nearest.gap < gap) return nearest;
-  return std::nullopt;
+  if (nearest.gap >= gap) return std::nullopt;
+  return nearest.way == Nearest<Dim>::Way::out ? nearest : find_facing(i, point, j, gap);
+}
+
+/// Points beside others are no deeper than twice those that tell their way out themselves, else that way is another one.
+template <int Dim>
+std::vector<std::pair<std::size_t, Nearest<Dim>>> Solids<Dim>::find_near_points(std::size_t i, std::size_t j,
+                                                                                double gap) const {
+  std::vector<std::pair<std::size_t, Nearest<Dim>>> found;
+  if (side_of(i, j) == 0) return found;
+  double depth = gap;
+  for (std::size_t k = 0; k < solids_[i].points.size(); ++k)
+    if (const auto nearest = find_near(i, k, j, gap); nearest && nearest->way != Nearest<Dim>::Way::none) {
+      found.emplace_back(k, *nearest);
+      if (nearest->way == Nearest<Dim>::Way::out) depth = std::max(depth, -nearest->gap);
+    }
+  std::erase_if(found, [&](const auto& entry) {
+    const Nearest<Dim>& nearest = entry.second;
+    return nearest.way == Nearest<Dim>::Way::beside && (nearest.gap >= gap || -nearest.gap > 2 * depth);
+  });
+  return found;
 }
 
 template <int Dim>
@@ -240,14 +276,14 @@ std::vector<Penetration<Dim>> Solids<Dim>::penetrations() const {
   for (std::size_t i = 0; i < solids_.size(); ++i)
     for (std::size_t j = 0; j < solids_.size(); ++j) {
       if (side_of(i, j) == 0) continue;
-      Penetration<Dim> penetration{i, j, 0, Vec<Dim>::Zero(), true};
-      for (const FacetPoint<Dim>& point : solids_[i].points) {
-        const auto nearest = find_near(i, point, j, 0);
+      Penetration<Dim> penetration{i, j, 0, solids_[i].points[0].at(y_), true};
+      for (std::size_t k = 0; k < solids_[i].points.size(); ++k) {
+        const auto nearest = find_near(i, k, j, 0);
         if (!nearest) penetration.is_whole = false;
-        if (nearest && -nearest->gap > penetration.depth)
-          penetration.depth = -nearest->gap, penetration.place = point.at(y_);
+        if (nearest && nearest->way == Nearest<Dim>::Way::out && -nearest->gap > penetration.depth)
+          penetration.depth = -nearest->gap, penetration.place = solids_[i].points[k].at(y_);
       }
-      if (penetration.depth > 0) found.push_back(penetration);
+      if (penetration.depth > 0 || penetration.is_whole) found.push_back(penetration);
     }
   return found;
 }
@@ -259,10 +295,9 @@ std::optional<Vec<Dim>> Solids<Dim>::find_crossing_obstacles() const {
     for (std::size_t j = 0; j < solids_.size(); ++j) {
       if (i == j || solids_[i].part != kNone || solids_[j].part != kNone || !shapes_[j].closed) continue;
       const Box<Dim>& box = shapes_[j].box;
-      for (const FacetPoint<Dim>& point : solids_[i].points) {
-        const Vec<Dim> p = point.at(y_);
-        if (!solids_[i].is_flat && box.contains(p) &&
-            find_nearest(i, point, j).gap < -kTouching * (box.max - box.min).norm())
+      for (std::size_t k = 0; k < solids_[i].points.size(); ++k) {
+        const Vec<Dim> p = solids_[i].points[k].at(y_);
+        if (!solids_[i].is_flat && box.contains(p) && find_nearest(i, k, j).gap < -kTouching * (box.max - box.min).norm())
           return p;
       }
     }

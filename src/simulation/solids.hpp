@@ -4,7 +4,7 @@
 
 #include <limits>
 #include <optional>
-#include <set>
+#include <utility>
 #include <vector>
 
 #include "fem/chord_levels.hpp"
@@ -36,19 +36,22 @@ struct Solid {
   double thickness = std::numeric_limits<double>::infinity();  ///< of its thinnest body [m]
   std::vector<std::array<int, Dim>> facets;  ///< vertices of the contact surface; those of bodies are oriented outward
   std::vector<FacetPoint<Dim>> points;       ///< of these: corners, middles of edges, and in 3D of facets
-  std::set<int> held;                        ///< coordinates of bodies' vertices that conditions hold
+  std::vector<std::vector<int>> facets_at;   ///< by point: the facets that have it
 };
 
 /// The solids of a setup whose contact surface has no proxy.
 template <int Dim>
 std::vector<Solid<Dim>> find_solids(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& chords);
 
-/// Where a point is from a solid.
+/// Where a point is from a solid. `beside`: the nearest facet faces none at the point, as where sides of two bodies are
+/// flush, and the way out is through one that does; `none`: no such facet is there.
 template <int Dim>
 struct Nearest {
+  enum class Way { out, beside, none };
   FacetPoint<Dim> foot;
-  Vec<Dim> normal;                                       ///< of length 1: the way out
-  double gap = std::numeric_limits<double>::infinity();  ///< negative inside [m]
+  Vec<Dim> normal;  ///< of length 1: the way out
+  double gap = 0;   ///< negative inside [m]
+  Way way = Way::none;
 };
 
 /// How deep points of one solid are in another.
@@ -75,20 +78,20 @@ class Solids {
   std::vector<Penetration<Dim>> penetrations() const;
   /// Where closed obstacles are in each other.
   std::optional<Vec<Dim>> find_crossing_obstacles() const;
-  /// Calls visit(point, nearest) for the points that are less than `gap` apart from another solid, or inside of it.
+  /// Calls visit(point, nearest) for the points that are less than `gap` apart from another solid, or inside of it, and have
+  /// a way out.
   template <typename Visit>
   void for_each_near(double gap, const Visit& visit) const {
     for (std::size_t i = 0; i < solids_.size(); ++i)
       for (std::size_t j = 0; j < solids_.size(); ++j)
-        if (const double side = side_of(i, j); side != 0)
-          for (const FacetPoint<Dim>& point : solids_[i].points)
-            if (const auto nearest = find_near(i, point, j, gap)) visit(point, *nearest);
+        for (const auto& [point, nearest] : find_near_points(i, j, gap)) visit(solids_[i].points[point], nearest);
   }
 
  private:
   struct Shape {
     Box<Dim> box;
     Bvh<Dim> tree;
+    std::vector<Vec<Dim>> normals;             ///< by facet: of length 1, outward of bodies
     std::optional<ClosedSurface<Dim>> closed;  ///< none: it has no inside
   };
 
@@ -96,9 +99,13 @@ class Solids {
   /// On which side of the solid j the solid i has to be: 1 outside, -1 inside, 0 where nothing is asked.
   double side_of(std::size_t i, std::size_t j) const { return sides_[i * solids_.size() + j]; }
   double find_side(std::size_t i, std::size_t j) const;
-  std::optional<Nearest<Dim>> find_near(std::size_t i, const FacetPoint<Dim>& point, std::size_t j, double gap) const;
-  /// Finds where a point of the solid i is from j; facets that conditions hold in one plane with it are no way out.
-  Nearest<Dim> find_nearest(std::size_t i, const FacetPoint<Dim>& point, std::size_t j) const;
+  /// Whether a facet of the solid j faces one at a point of the solid i. Obstacles, which have no orientation, always do.
+  bool is_facing(std::size_t i, std::size_t point, std::size_t j, int facet) const;
+  Nearest<Dim> find_nearest(std::size_t i, std::size_t point, std::size_t j) const;
+  /// The nearest of the facets that face the point, by the distance of its plane; way none where the point is not before it.
+  Nearest<Dim> find_facing(std::size_t i, std::size_t point, std::size_t j, double gap) const;
+  std::optional<Nearest<Dim>> find_near(std::size_t i, std::size_t point, std::size_t j, double gap) const;
+  std::vector<std::pair<std::size_t, Nearest<Dim>>> find_near_points(std::size_t i, std::size_t j, double gap) const;
 
   VectorX y_;
   std::vector<Solid<Dim>> solids_;
