@@ -21,13 +21,6 @@ namespace itr::scene {
 
 namespace {
 
-std::string read_name(const Node& node, const char* what) {
-  const std::string name = node["name"].string(what + (" " + text_of(read_label(node["id"].items().front(), 0))));
-  if (name.empty() || name.find_first_of(",\"\n") != std::string::npos)
-    node["name"].fail("a name without commas and quotes");
-  return name;
-}
-
 /// A number for all directions, one an axis, or rows.
 Mat<3> read_stiffness(const Node& node, int dim) {
   Mat<3> stiffness = Mat<3>::Zero();
@@ -76,7 +69,7 @@ std::pair<double, Vec<Dim>> area_of(const Mesh<Dim>& mesh, const std::vector<int
 template <int Dim>
 Spring read_spring(const Node& node, const Sets& sets, const std::set<int>& with_facets, const Mesh<Dim>& mesh) {
   Spring spring{.surfaces = read_surfaces(node["id"], sets, with_facets, "the ids of the surfaces that the springs hold")};
-  spring.name = read_name(node, "spring");
+  spring.name = read_curve_name(node, "spring");
   const Node total = node["stiffness"], by_area = node["stiffness_by_area"];
   if (total.exists() == by_area.exists())
     total.fail(total.exists() ? "a stiffness beside stiffness_by_area" : "nothing", "stiffness or stiffness_by_area");
@@ -94,7 +87,7 @@ void require_held(const Node& node, const std::array<bool, 3>& held, const char*
 template <int Dim>
 Coupling read_coupling(const Node& node, const Sets& sets, const std::set<int>& with_facets, const Setup<Dim>& setup) {
   Coupling coupling{.surfaces = read_surfaces(node["id"], sets, with_facets, "the ids of the surfaces of the point")};
-  coupling.name = read_name(node, "coupling");
+  coupling.name = read_curve_name(node, "coupling");
   coupling.is_rigid = node["kind"].choice({"distributing", "rigid"}, 0) == 1;
   coupling.point.head<Dim>() = area_of(setup.mesh, coupling.surfaces).second;
   if (const Node point = node["point"]; point.exists()) {
@@ -116,6 +109,13 @@ Coupling read_coupling(const Node& node, const Sets& sets, const std::set<int>& 
 }
 
 }  // namespace
+
+std::string read_curve_name(const Node& node, const std::string& what) {
+  const std::string name = node["name"].string(what + " " + text_of(read_label(node["id"].items().front(), 0)));
+  if (name.empty() || name.find_first_of(",\"\n") != std::string::npos)
+    node["name"].fail("a name without commas and quotes");
+  return name;
+}
 
 std::vector<int> read_surfaces(const Node& node, const Sets& sets, const std::set<int>& with_facets,
                                const std::string& expected) {

@@ -18,6 +18,9 @@ namespace itr::scene {
 std::vector<int> read_surfaces(const Node& node, const Sets& sets, const std::set<int>& with_facets,
                                const std::string& expected);
 
+/// The name of an entry's curve in forces.csv: by default `what` and the first of its ids.
+std::string read_curve_name(const Node& node, const std::string& what);
+
 /// Fills in both for a setup whose mesh and time are read.
 template <int Dim>
 void read_supports(const Node& root, const Sets& sets, Setup<Dim>& setup);
