@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "energy/tie.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -188,6 +190,12 @@ double TieEnergy<Dim>::error_at(const Increment& at) const {
 template <int Dim>
 void TieEnergy<Dim>::update(const Increment& at) {
   for (Row& row : rows_) row.multiplier = traction(row, gap(row, at));
+}
+
+template <int Dim>
+std::string TieEnergy<Dim>::describe(const Increment& at, const Units& units) const {
+  return fmt::format("tied surfaces stay apart by {}: conditions may hold both sides in different places",
+                     units.text(largest_gap(VectorX(at.base + at.d - rest_)), "m", 3));
 }
 
 template <int Dim>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Bonded surfaces: the conditions of mortars (mortar.hpp), by an augmented Lagrangian. A solve is repeated with new
-// multipliers, which are the tractions of the bond, until the gaps are nothing (Hestenes 1969; Powell 1969).
+// multipliers, which are the tractions of the bond, until the gaps are nothing.
 #pragma once
 
 #include <functional>
@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "energy/constraint.hpp"
 #include "energy/increment.hpp"
 #include "energy/mortar.hpp"
 
@@ -21,7 +22,7 @@ using TractionOfTie = std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>
 /// scale * sum over rows of lambda . g + k |g|^2 / (2 A), with the gap g = sum of weights (x - X) less its target, and A the
 /// measure of the row.
 template <int Dim>
-class TieEnergy final : public Energy, public IncrementalTerm {
+class TieEnergy final : public Energy, public IncrementalTerm, public Constraint {
  public:
   /// `mortars` and `cells` must outlive this. k is stiff beside the softer body's cells, and beside their inertia where
   /// `has_inertia`: `scale` then is alpha h^2 [s^2].
@@ -38,11 +39,10 @@ class TieEnergy final : public Energy, public IncrementalTerm {
   void begin_at(ConstVectorView base);
   /// Lets the gaps go to `fraction` of these, of a field over nodes, instead of to none [m].
   void add_targets(double fraction, ConstVectorView field);
-  /// By which part of the largest traction those of `at` are off the multipliers; 0 where gaps are round-off.
-  double error_at(const Increment& at) const;
-  /// Makes the tractions at `at` the multipliers.
-  void update(const Increment& at);
-  void stiffen(double factor) { factor_ *= factor; }
+  double error_at(const Increment& at) const override;
+  void update(const Increment& at) override;
+  void stiffen(double factor) override { factor_ *= factor; }
+  std::string describe(const Increment& at, const Units& units) const override;
   /// The largest mean gap of a row [m]: of a field over nodes, interleaved.
   double largest_gap(ConstVectorView field) const;
   /// Its tractions on both surfaces of each mortar, functions that outlive this.

@@ -14,6 +14,7 @@
 #include "polyfem/python_value.hpp"
 #include "readers.hpp"
 #include "selection_file.hpp"
+#include "supports.hpp"
 
 namespace itr::scene {
 
@@ -299,9 +300,7 @@ class ConditionReader {
     std::set<std::string> names;
     for (const Node& node : boundary_["pressure_cavity"].items()) {
       Cavity cavity{.surfaces = surfaces_of_cavity(node["id"]), .pressure = read_overpressure(node)};
-      cavity.name = node["name"].string("cavity " + text_of(read_label(node["id"].items().front(), 0)));
-      if (cavity.name.empty() || cavity.name.find_first_of(",\"\n") != std::string::npos)
-        node["name"].fail("a name without commas and quotes");
+      cavity.name = read_curve_name(node, "cavity");
       if (!names.insert(cavity.name).second) node["name"].fail("a name that no cavity before it has");
       cavity.external_pressure = node["external_pressure"].non_negative(cavity.external_pressure);
       const bool is_fluid = node["law"].choice({"gas", "fluid"}, 0) == 1;

@@ -32,23 +32,27 @@ Volume<Dim> volume_of(const Mesh<Dim>& mesh, const std::vector<int>& bodies) {
   return sum;
 }
 
-void read_held(const Node& node, int dim, RigidBody& body) {
-  static const std::vector<std::string> names = {"x", "y", "z", "rx", "ry", "rz"};
-  for (const Node& name : node.items()) {
-    const int index = name.choice(names, 0);
-    if (dim == 2 && index > 1 && index < 5) name.fail(abbreviate(name.json()) + " in a plane", "x, y or rz");
-    (index < 3 ? body.held_position[index] : body.held_rotation[index - 3]) = true;
-  }
-}
-
 /// Times at which loads have to have a value.
 std::vector<double> sampled_times(const TimeOptions& time) {
   const double end = time.is_static ? time.t0 + 1 : time.t0 + time.dt * time.steps;
   return {time.t0, (time.t0 + end) / 2, end};
 }
 
+}  // namespace
+
+void read_held(const Node& node, int dim, std::array<bool, 3>& position, std::array<bool, 3>& rotation) {
+  static const std::vector<std::string> names = {"x", "y", "z", "rx", "ry", "rz"};
+  for (const Node& name : node.items()) {
+    const int index = name.choice(names, 0);
+    if (dim == 2 && index > 1 && index < 5) name.fail(abbreviate(name.json()) + " in a plane", "x, y or rz");
+    (index < 3 ? position[index] : rotation[index - 3]) = true;
+  }
+}
+
 template <int Dim>
-std::function<Vec<3>(double t)> read_load(const Node& node, const TimeOptions& time, const Vec<3>& about) {
+FunctionOfTime read_vector(const Node& node, const TimeOptions& time, const Vec<3>& about) {
+  if (!node.exists()) return {};
+  if (node.items().size() != Dim) node.fail(std::to_string(Dim) + " numbers or expressions");
   const Vec<Dim> X = about.head<Dim>();
   const ValueFunction<Dim> value = read_function<Dim>(node);
   check_defined<Dim>(value.function, {X}, sampled_times(time), node);
@@ -60,26 +64,18 @@ std::function<Vec<3>(double t)> read_load(const Node& node, const TimeOptions& t
   };
 }
 
-template <int Dim>
-void read_loads(const Node& node, const TimeOptions& time, RigidBody& body) {
-  if (const Node force = node["force"]; force.exists()) {
-    if (force.items().size() != Dim) force.fail(std::to_string(Dim) + " numbers or expressions");
-    body.force = read_load<Dim>(force, time, body.about);
+FunctionOfTime read_axial_vector(const Node& node, int dim, const TimeOptions& time, const Vec<3>& about) {
+  if (!node.exists()) return {};
+  if (dim == 3) {
+    if (!node.json().is_array() || node.items().size() != 3) node.fail("three numbers or expressions");
+    return read_vector<3>(node, time, about);
   }
-  const Node moment = node["moment"];
-  if (!moment.exists()) return;
-  if (Dim == 3) {
-    if (!moment.json().is_array() || moment.items().size() != 3) moment.fail("three numbers or expressions");
-    body.moment = read_load<3>(moment, time, body.about);
-    return;
-  }
-  if (moment.json().is_array()) moment.fail("a number or an expression: the moment about z");
-  const ScalarFunction<3> value = read_scalar_function<3>(moment, moment["interpolation"]);
-  for (const double t : sampled_times(time)) value.function(body.about, t);
-  if (!value.is_zero) body.moment = [f = value.function, X = body.about](double t) { return Vec<3>(0, 0, f(X, t)); };
+  if (node.json().is_array()) node.fail("a number or an expression: that about z");
+  const ScalarFunction<3> value = read_scalar_function<3>(node, node["interpolation"]);
+  for (const double t : sampled_times(time)) value.function(about, t);
+  if (value.is_zero) return {};
+  return [f = value.function, about](double t) { return Vec<3>(0, 0, f(about, t)); };
 }
-
-}  // namespace
 
 bool is_rigid(const Node& geometry) { return geometry.has("rigid") && geometry["enabled"].boolean(true); }
 
@@ -155,8 +151,9 @@ void read_rigid_bodies(const Node& root, const LabelIds& bodies, Setup<Dim>& set
       if (numbers.size() != Dim) about.fail(std::to_string(Dim) + " numbers");
       body->about.head<Dim>() = Eigen::Map<const Vec<Dim>>(numbers.data());
     }
-    read_held(node["held"], Dim, *body);
-    read_loads<Dim>(node, setup.time, *body);
+    read_held(node["held"], Dim, body->held_position, body->held_rotation);
+    body->force = read_vector<Dim>(node["force"], setup.time, body->about);
+    body->moment = read_axial_vector(node["moment"], Dim, setup.time, body->about);
     Material material;
     material.law = MaterialLaw::saint_venant_kirchhoff;
     material.youngs_modulus = 1;  // Setup::choose_defaults knows the others
@@ -172,6 +169,8 @@ void read_rigid_bodies(const Node& root, const LabelIds& bodies, Setup<Dim>& set
   }
 }
 
+template FunctionOfTime read_vector<2>(const Node&, const TimeOptions&, const Vec<3>&);
+template FunctionOfTime read_vector<3>(const Node&, const TimeOptions&, const Vec<3>&);
 template void read_rigid_bodies(const Node&, const LabelIds&, Setup<2>&);
 template void read_rigid_bodies(const Node&, const LabelIds&, Setup<3>&);
 

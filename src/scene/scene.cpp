@@ -13,6 +13,7 @@
 #include "readers.hpp"
 #include "rigid.hpp"
 #include "selection_file.hpp"
+#include "supports.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {
@@ -103,7 +104,26 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   read_preset_problem<Dim>(root, sets.bodies, setup);
   setup.ties = read_ties<Dim>(root, sets, setup.mesh);
+  read_supports<Dim>(root, sets, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
+}
+
+/// Adds curves of what has a name of its own: cavities, springs and coupled points.
+template <int Dim>
+void add_named_curves(const Node& root, const Setup<Dim>& setup, std::vector<ForceTarget>& curves) {
+  const auto add = [&](const char* list, const char* what, const auto& named, const std::array<double, 3>& about) {
+    for (const Node& node : root["output"]["forces"].items())
+      if (node["name"].string("") == named.name)
+        node["name"].fail("\"" + named.name + "\", the name of a " + what, "another name");
+    if (std::ranges::find(curves, named.name, &ForceTarget::name) != curves.end())
+      throw InputError({root.document().file.string(), std::string("/") + list, "two parts of the name " + named.name,
+                        "names that differ"});
+    curves.push_back({.name = named.name, .surfaces = named.surfaces, .about = about});
+  };
+  for (const Cavity& cavity : setup.cavities) add("boundary_conditions/pressure_cavity", "cavity", cavity, {});
+  for (const auto& spring : springs_of<Dim>(setup.nodal_loads)) add("springs", "spring", *spring, {});
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads))
+    add("couplings", "coupling", *coupling, {coupling->point[0], coupling->point[1], coupling->point[2]});
 }
 
 template <int Dim>
@@ -125,11 +145,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   parts = name_parts<Dim>(geometries, obstacles, sets);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);
   read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
-  for (const Node& node : root["output"]["forces"].items())
-    for (const Cavity& cavity : setup.cavities)
-      if (node["name"].string("") == cavity.name)
-        node["name"].fail("\"" + cavity.name + "\", the name of a cavity", "another name");
-  for (const Cavity& cavity : setup.cavities) curves.push_back({.name = cavity.name, .surfaces = cavity.surfaces});
+  add_named_curves(root, setup, curves);
   setup.fields.curves = std::move(curves);
   setup.fields.points = read_points<Dim>(root);
   setup.fields.error_bars = root["output"]["error_bars"].boolean(false);

@@ -9,6 +9,7 @@
 
 #include "barrier_stiffness.hpp"
 #include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "mesh/rest_box.hpp"
@@ -152,7 +153,7 @@ double prescribed_growth(const Setup<Dim>& setup) {
 template <int Dim>
 double available_energy(const Setup<Dim>& setup) {
   if (!setup.neumann.empty() || !setup.pressure.empty() || !setup.cavities.empty() || !setup.dirichlet.empty() ||
-      !setup.obstacles.motions.empty() || setup.contact.resolve_overlap ||
+      !setup.obstacles.motions.empty() || setup.contact.resolve_overlap || !couplings_of<Dim>(setup.nodal_loads).empty() ||
       std::ranges::any_of(setup.materials, [](const auto& entry) { return bool(entry.second.eigenstrain); }))
     return 0;
   const Mesh<Dim>& mesh = setup.mesh;

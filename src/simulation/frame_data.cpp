@@ -20,6 +20,7 @@
 #include "fem/locator.hpp"
 #include "simulation/contact_pressure.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/coupled_points.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/step_terms.hpp"
 
@@ -315,10 +316,16 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
   InertiaEnergy<Dim>(frame.cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
                      VectorX::Zero(data.v.size()))
       .add_mass_product(data.v, product);
-  if (options.kinetic_energy) asked.kinetic_energy = {0.5 * data.v.dot(product)};
-  if (!options.momentum) return;
-  asked.momentum.assign(Dim, 0);
-  for (Eigen::Index i = 0; i < product.size(); ++i) asked.momentum[i % Dim] += product[i];
+  double energy = 0.5 * data.v.dot(product);
+  Vec<Dim> momentum = Vec<Dim>::Zero();
+  for (Eigen::Index i = 0; i < product.size(); ++i) momentum[i % Dim] += product[i];
+  for (const auto& surface : coupled_surfaces<Dim>(setup, frame.cells)) {
+    const Vec<Dim> v = surface.point().velocity(data.x, data.v);
+    energy += surface.coupling->mass / 2 * v.squaredNorm();
+    momentum += surface.coupling->mass * v;
+  }
+  if (options.kinetic_energy) asked.kinetic_energy = {energy};
+  if (options.momentum) asked.momentum.assign(momentum.begin(), momentum.end());
 }
 
 }  // namespace

@@ -27,9 +27,9 @@
 #include "lagging_rounds.hpp"
 #include "newton/corrected_system.hpp"
 #include "newton/iterate.hpp"
+#include "simulation/constraint_rounds.hpp"
 #include "simulation/rigid_solve.hpp"
 #include "simulation/step_problem.hpp"
-#include "simulation/tie_rounds.hpp"
 
 namespace itr {
 
@@ -337,9 +337,9 @@ class LaggedSolve {
                     : minimize(EnergyOfIncrement(all, base_), d, dofs_, target, in_use, options, workspace_, extras);
     };
     NewtonSummary summary = solve();
-    if (problem_.tie_ && ended_by == EndedBy::solver) {
+    if (!problem_.constraints_.empty() && ended_by == EndedBy::solver) {
       extras.step_to_start.resize(0);
-      close_ties<Dim>(*problem_.tie_, cells_, base_, d, solve, setup_.units, summary);
+      close_constraints(problem_.constraints_, base_, d, solve, setup_.units, summary);
     }
     x = positions_at(d, target);
     if (summary.blocked_from.size() > 0) summary.blocked_from += base_;

@@ -157,10 +157,18 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
       context.loads.pressures.emplace_back(
           tag, [p = CavityEnergy<Dim>(cells, cavity, 1).pressure(x)](const RestPoint<Dim>&) { return p; });
   for (auto& traction : problem.tie_tractions()) context.loads.tractions.push_back(std::move(traction));
+  for (auto& traction : problem.coupling_tractions(x)) context.loads.tractions.push_back(std::move(traction));
   if (setup.time.has_inertia())  // past positions and velocities would have gaps on other meshes
     for (const Tie& tie : setup.ties)
       for (const auto* side : {&tie.a, &tie.b})
         context.kept_surfaces.insert(context.kept_surfaces.end(), side->begin(), side->end());
+  context.held_components = held_components(setup);
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads))
+    for (const int tag : coupling->surfaces) {
+      if (coupling->is_rigid) context.held_components[tag].fill(true);
+      if (coupling->is_rigid || (setup.time.has_inertia() && (coupling->is_held() || coupling->mass > 0)))
+        context.kept_surfaces.push_back(tag);
+    }
   if (setup.follower.forces) {
     const int dofs = Dim * state.mesh.num_nodes();
     VectorX forces = VectorX::Zero(dofs);
@@ -169,7 +177,6 @@ StepContext<Dim> make_context(const StepTools<Dim>& tools, const State<Dim>& sta
   }
   context.contact.barrier_stiffness = problem.stiffness().value;  // that of the moment, where it is adaptive
   context.contact.friction_velocity = problem.friction_velocity();
-  context.held_components = held_components(setup);
   context.newton = setup.newton;
   context.shortest_edge = tools.initial_edges.shortest;
   context.longest_edge = tools.initial_edges.longest;

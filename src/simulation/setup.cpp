@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include "energy/mortar.hpp"
 #include "itr/core.hpp"
 #include "mesh/facet_tags.hpp"
+#include "simulation/coupled_points.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/step_terms.hpp"
 
@@ -215,17 +217,20 @@ void check_cavities(const Setup<Dim>& setup) {
   }
 }
 
+/// Refuses tags that no surface has.
+void check_surfaces(const std::string& place, const std::vector<int>& tags, const std::set<int>& with_facets) {
+  if (tags.empty()) refuse(place, "no surfaces", "at least one");
+  for (const int tag : tags)
+    if (!with_facets.contains(tag)) refuse(place, fmt::format("{}, which no surface has", tag), "the id of a surface");
+}
+
 template <int Dim>
 void check_ties(const Setup<Dim>& setup) {
   if (setup.ties.empty()) return;
   const std::set<int> with_facets = facet_tags(setup.mesh);
   for (std::size_t i = 0; i < setup.ties.size(); ++i)
-    for (const auto& [key, tags] : {std::pair{"a", &setup.ties[i].a}, std::pair{"b", &setup.ties[i].b}}) {
-      if (tags->empty()) refuse(fmt::format("/ties/{}/{}", i, key), "no surfaces", "at least one");
-      for (const int tag : *tags)
-        if (!with_facets.contains(tag))
-          refuse(fmt::format("/ties/{}/{}", i, key), fmt::format("{}, which no surface has", tag), "the id of a surface");
-    }
+    for (const auto& [key, tags] : {std::pair{"a", &setup.ties[i].a}, std::pair{"b", &setup.ties[i].b}})
+      check_surfaces(fmt::format("/ties/{}/{}", i, key), *tags, with_facets);
   const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
   const std::vector<Mortar<Dim>> mortars = mortars_of(setup, setup.mesh, cells);
   for (std::size_t i = 0; i < mortars.size(); ++i)
@@ -240,6 +245,74 @@ void check_ties(const Setup<Dim>& setup) {
           fmt::format("surfaces of which neither covers the other: at most {:.1f} % of one side", 100 * mortars[i].covered),
           fmt::format("one side that the other covers, by {:g} % at least: give the part that is bonded an id of its own",
                       100 * kLeastCovered));
+}
+
+void check_stiffness(const std::string& place, const Mat<3>& stiffness, int dim) {
+  Mat<3> used = Mat<3>::Zero();
+  used.topLeftCorner(dim, dim) = stiffness.topLeftCorner(dim, dim);
+  if (!used.allFinite() || used != used.transpose() ||
+      !(Eigen::SelfAdjointEigenSolver<Mat<3>>(used).eigenvalues()[0] >= -1e-12 * used.norm()))
+    refuse(place, "a stiffness that is not symmetric, or negative somewhere", "a symmetric one that is nowhere negative");
+}
+
+/// Nodes that conditions hold, that other rigid surfaces have, or that are of rigid bodies do not go with a coupling.
+template <int Dim>
+void check_nodes_of_couplings(const Setup<Dim>& setup) {
+  constexpr std::size_t kMostNodes = 1000;
+  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
+  const auto surfaces = coupled_surfaces<Dim>(setup, whole_mesh(setup.mesh, {}));
+  std::map<int, std::size_t> rigid;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    const std::vector<int>& nodes = surfaces[i].mean.nodes;
+    const std::string place = fmt::format("/couplings/{}/id", i);
+    if (nodes.size() > kMostNodes)
+      refuse(place, fmt::format("surfaces of {} nodes, which are all coupled to each other", nodes.size()),
+             fmt::format("at most {}; a rigid geometry that is tied to them (/ties) has no such limit", kMostNodes));
+    if (!surfaces[i].coupling->is_rigid) continue;
+    for (const int v : nodes) {
+      if (!rigid.try_emplace(v, i).second)
+        refuse(place, fmt::format("a rigid surface that shares vertex {} with another one", v), "one that shares none");
+      for (int c = 0; c < Dim; ++c)
+        if (held[Dim * v + c])
+          refuse(place, fmt::format("a rigid surface of which a condition holds vertex {}", v),
+                 "what is held of its point in `held`, and no condition at the surface");
+    }
+  }
+}
+
+template <int Dim>
+void check_supports(const Setup<Dim>& setup) {
+  const auto springs = springs_of<Dim>(setup.nodal_loads);
+  const auto couplings = couplings_of<Dim>(setup.nodal_loads);
+  if (springs.empty() && couplings.empty()) return;
+  const std::set<int> with_facets = facet_tags(setup.mesh);
+  for (std::size_t i = 0; i < springs.size(); ++i) {
+    check_surfaces(fmt::format("/springs/{}/id", i), springs[i]->surfaces, with_facets);
+    check_stiffness(fmt::format("/springs/{}/stiffness", i), springs[i]->stiffness, Dim);
+  }
+  std::map<int, std::string> taken;  // by tag: what else moves the surface
+  for (const auto& condition : setup.dirichlet) taken[condition.tag] = "that a Dirichlet condition holds";
+  for (const Tie& tie : setup.ties)
+    for (const auto* side : {&tie.a, &tie.b})
+      for (const int tag : *side) taken[tag] = "that is tied";
+  for (const CellId c : setup.mesh.live_cells())
+    if (rigid_body_of(setup.materials.at(setup.mesh.body(c))))
+      for (const VertexId v : setup.mesh.cell(c))
+        for (const FacetId f : setup.mesh.facets_of(v))
+          taken[setup.mesh.facet_tag(f)] = "of a rigid body, which has forces, a mass and held components of its own";
+  for (std::size_t i = 0; i < couplings.size(); ++i) {
+    const Coupling& coupling = *couplings[i];
+    const std::string place = fmt::format("/couplings/{}", i);
+    check_surfaces(place + "/id", coupling.surfaces, with_facets);
+    check_stiffness(place + "/stiffness", coupling.stiffness, Dim);
+    require_not_negative(place + "/mass", coupling.mass);
+    for (const int tag : coupling.surfaces)
+      if (const auto [entry, is_free] = taken.try_emplace(tag, "that another coupling has"); !is_free)
+        refuse(place + "/id", "a surface " + entry->second, "a surface that nothing else moves");
+    if (!coupling.is_held() && !coupling.force && !coupling.moment && coupling.mass == 0 && coupling.stiffness.isZero(0))
+      refuse(place, "a point on which nothing acts", "force, moment, mass, stiffness, held or \"kind\": \"rigid\"");
+  }
+  check_nodes_of_couplings(setup);
 }
 
 template <int Dim>
@@ -309,6 +382,7 @@ void Setup<Dim>::validate() const {
   check_cavities(*this);
   check_ties(*this);
   check_rigid(*this);
+  check_supports(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
   for (const auto& [name, list] :

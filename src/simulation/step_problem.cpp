@@ -27,7 +27,8 @@ MeshScope<Dim>::MeshScope(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
       chords(chords),
       cells(whole_mesh(mesh, setup.obstacles.rest)),
       diagonal(rest_diagonal(mesh)),
-      mortars(mortars_of(setup, mesh, cells)) {
+      mortars(mortars_of(setup, mesh, cells)),
+      coupled(coupled_surfaces<Dim>(setup, cells)) {
   add_patches(setup.materials, cells);
   if (setup.contact.enabled) surface = contact_surface(setup, mesh, chords);
   if (has_rigid_bodies(setup.materials)) rigid = std::make_unique<const RigidCoordinates<Dim>>(setup.materials, cells);
@@ -60,6 +61,36 @@ double& entry_of(EnergyReport& report, EnergyEntry entry) {
   const std::array<double*, kNumEnergyEntries> by_entry{&report.inertia,  &report.elastic, &report.body, &report.contact,
                                                         &report.friction, &report.damping, &report.host};
   return *by_entry[static_cast<std::size_t>(entry)];
+}
+
+bool is_diagonal(const Mat<3>& K) { return Mat<3>(K.diagonal().asDiagonal()) == K; }
+
+/// Adds to held components those that springs along the axes and coupled points keep from moving. A point that may turn
+/// counts as its nearest node.
+template <int Dim>
+std::vector<char> with_supports(const StepSetup<Dim>& setup, const CellSet<Dim>& cells,
+                                const std::vector<CoupledSurface<Dim>>& coupled, std::vector<char> held) {
+  const auto hold = [&](int node, const auto& is_held) {
+    for (int c = 0; c < Dim; ++c)
+      if (is_held(c)) held[Dim * node + c] = 1;
+  };
+  for (const auto& spring : springs_of<Dim>(setup.nodal_loads))
+    for (const auto& facet : cells.facets)
+      if (is_diagonal(spring->stiffness) && std::ranges::find(spring->surfaces, facet.tag) != spring->surfaces.end())
+        for (const int v : facet.vertices) hold(v, [&](int c) { return spring->stiffness(c, c) > 0; });
+  for (const auto& [coupling, mean, modulus, density] : coupled) {
+    const bool has_spring = is_diagonal(coupling->stiffness);
+    const auto is_held = [&](int c) { return coupling->held_position[c] || (has_spring && coupling->stiffness(c, c) > 0); };
+    const auto& turns = coupling->held_rotation;
+    if (turns[2] && (Dim == 2 || (turns[0] && turns[1]))) {
+      for (const int v : mean.nodes) hold(v, is_held);
+    } else {
+      Eigen::Index nearest = 0;
+      (mean.rest.colwise() - coupling->point.template head<Dim>()).colwise().squaredNorm().minCoeff(&nearest);
+      hold(mean.nodes[nearest], is_held);
+    }
+  }
+  return held;
 }
 
 }  // namespace
@@ -108,9 +139,15 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   if (!history.v.empty() && setup.contact.has_static_friction()) start_velocity_ = history.v[0];
   potential_.elastic()->set_quadrature_levels(levels);
   add_ties(history);
+  coupled_ = std::make_unique<const CoupledPoints<Dim>>(setup, terms_, scope_->coupled, history);
+  for (Constraint* constraint : coupled_->constraints()) constraints_.push_back(constraint);
+  if (!coupled_->empty())
+    terms_.follower = [this, others = terms_.follower](const VectorX& x) {
+      return coupled_->sum(x, others ? others(x) : nullptr);
+    };
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
-    if (auto loose = find_loose_parts<Dim>(cells_, base_, held_.held, setup.materials,
-                                           tie_ ? tie_->bonds() : std::vector<std::vector<int>>());
+    if (auto loose = find_loose_parts<Dim>(cells_, base_, with_supports(setup, cells_, scope_->coupled, held_.held),
+                                           setup.materials, tie_ ? tie_->bonds() : std::vector<std::vector<int>>());
         !loose.empty())
       least_motion_ = std::make_shared<LeastMotion<Dim>>(cells_, std::move(loose), terms_.scaling);
   reset_system();
@@ -127,6 +164,7 @@ void StepProblem<Dim>::add_ties(const History& history) {
   if (terms_.has_inertia && TimeIntegrator(setup_.time).is_trapezoidal(history))
     tie_->add_targets(0.5, VectorX(base_ - rest_positions<Dim>(cells_) + setup_.time.dt / 2 * history.v[0]));
   tie_->begin_at(base_);
+  constraints_.push_back(tie_.get());
 }
 
 template <int Dim>
@@ -407,6 +445,7 @@ template <int Dim>
 VectorX StepProblem<Dim>::momentum(const VectorX& v) const {
   VectorX result = VectorX::Zero(v.size());
   if (potential_.inertia()) potential_.inertia()->add_mass_product(v, result);
+  coupled_->add_mass_product(base_, v, result);
   return result;
 }
 

@@ -12,6 +12,7 @@
 #include "itr/setup.hpp"
 #include "newton/newton.hpp"
 #include "simulation/contact_surface.hpp"
+#include "simulation/coupled_points.hpp"
 #include "simulation/rigid_coordinates.hpp"
 #include "simulation/step_terms.hpp"
 #include "time/integrator.hpp"
@@ -33,7 +34,8 @@ struct MeshScope {
   std::unique_ptr<const RigidCoordinates<Dim>> rigid;  ///< null without rigid bodies
   double diagonal;                                     ///< of the bodies at rest [m]
   std::vector<Mortar<Dim>> mortars;                    ///< one a tie
-  Workspace workspace;                                 ///< search trees of the surface
+  std::vector<CoupledSurface<Dim>> coupled;
+  Workspace workspace;  ///< search trees of the surface
 };
 
 /// Data that a simulation keeps from step to step, so that they are not made again: they change no result, only the time.
@@ -138,6 +140,8 @@ class StepProblem {
   double scaling() const { return terms_.scaling; }
   /// The tractions by which ties act on both surfaces, in the last solution.
   std::vector<TractionOfTie<Dim>> tie_tractions() const;
+  /// Tractions of coupled points likewise, where the bodies are at x.
+  std::vector<TractionOfTie<Dim>> coupling_tractions(const VectorX& x) const { return coupled_->tractions(x); }
   double friction_velocity() const { return terms_.contact.friction_velocity; }  ///< eps_v of the last solve [m/s]
 
  private:
@@ -175,7 +179,9 @@ class StepProblem {
   struct Solution {
     VectorX x, increment;
   };
-  std::shared_ptr<TieEnergy<Dim>> tie_;               ///< null: there are no ties
+  std::shared_ptr<TieEnergy<Dim>> tie_;  ///< null: there are no ties
+  std::unique_ptr<const CoupledPoints<Dim>> coupled_;
+  std::vector<Constraint*> constraints_;              ///< that a solve is repeated for
   std::shared_ptr<LeastMotion<Dim>> least_motion_;    ///< null: inertia or conditions hold all bodies
   VectorX base_;                                      ///< positions at the start of the step
   Solution solution_;                                 ///< of the last solve

@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
+#include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "itr/core.hpp"
 #include "mesh/rest_box.hpp"
@@ -158,7 +161,9 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   for (auto& [body, material] : materials)
     if (viscous && viscous->acts_on(body)) material.deviator *= viscous->factor(body);
   std::vector<TermFactory<Dim>> host = setup.terms;
-  host.insert(host.end(), setup.nodal_loads.begin(), setup.nodal_loads.end());
+  std::ranges::copy_if(setup.nodal_loads, std::back_inserter(host), [](const TermFactory<Dim>& load) {
+    return load.template target<CouplingEntry<Dim>>() == nullptr;  // whose terms StepProblem makes
+  });
   return {.materials = std::move(materials),
           .viscous = viscous,
           .loads = loads_at(setup, t),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "unsupported.hpp"
 #include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 
 #include <algorithm>
 
@@ -21,6 +22,15 @@ bool may_curve(const Setup<Dim>& setup) {
 template <int Dim>
 bool has_patches(const Setup<Dim>& setup) {
   return std::ranges::any_of(setup.materials, [](const auto& e) { return e.second.volume == VolumeForm::patches; });
+}
+
+template <int Dim>
+bool has_springs(const Setup<Dim>& setup) {
+  return !springs_of<Dim>(setup.nodal_loads).empty();
+}
+template <int Dim>
+bool has_couplings(const Setup<Dim>& setup) {
+  return !couplings_of<Dim>(setup.nodal_loads).empty();
 }
 
 template <int Dim>
@@ -45,6 +55,18 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool) { return !setup.cavities.empty() && setup.fields.error_bars; }},
     {{"/output/error_bars", "error bars where surfaces are tied"},
      [](const Setup<Dim>& setup, bool) { return !setup.ties.empty() && setup.fields.error_bars; }},
+    {{"/output/error_bars", "error bars where springs or coupled points act"},
+     [](const Setup<Dim>& setup, bool) { return setup.fields.error_bars && (has_springs(setup) || has_couplings(setup)); }},
+    {{"/contact/initial_overlap", "\"resolve\" with springs or coupled points, which are no part of a start without loads"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.contact.resolve_overlap && (has_springs(setup) || has_couplings(setup));
+     }},
+    {{"/couplings", "coupled points of axisymmetric bodies, whose surfaces only move along the axis in the mean"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && has_couplings(setup); }},
+    {{"/time/dt", "steps that choose their lengths where there are coupled points"},
+     [](const Setup<Dim>& setup, bool) { return setup.time.adaptive.enabled && has_couplings(setup); }},
+    {{"/initial_conditions/acceleration", "\"consistent\" where there are coupled points"},
+     [](const Setup<Dim>& setup, bool) { return setup.consistent_initial_acceleration && has_couplings(setup); }},
     {{"/ties", "ties where a collision mesh touches"},
      [](const Setup<Dim>& setup, bool) { return !setup.ties.empty() && setup.contact.enabled && setup.proxy; }},
     {{"/initial_conditions/acceleration", "\"consistent\" accelerations of bodies that are tied"},

@@ -109,7 +109,7 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
                                 const Logger& logger) {
   constexpr double kSmallWeight = 0.1, kLeastRest = 0.1;
   if (!setup.contact.enabled || setup.time.has_inertia() || !setup.neumann.empty() || !setup.pressure.empty() ||
-      !setup.cavities.empty() || !setup.terms.empty() || setup.follower.forces)
+      !setup.cavities.empty() || !setup.nodal_loads.empty() || !setup.terms.empty() || setup.follower.forces)
     return;
   if (report.energy.elastic > most_elastic_) {
     most_elastic_ = report.energy.elastic;

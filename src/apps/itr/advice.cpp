@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "advice.hpp"
 #include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 
 #include <fmt/format.h>
 
@@ -233,6 +234,14 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (const CellId c : mesh.live_cells())
     if (const RigidBody* const rigid = rigid_body_of(setup.materials.at(mesh.body(c))); rigid && rigid->is_held())
       fixed.insert(part[mesh.cell(c)[0]]);
+  std::set<int> supported;  // tags
+  for (const auto& spring : springs_of<Dim>(setup.nodal_loads))
+    supported.insert(spring->surfaces.begin(), spring->surfaces.end());
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads))
+    if (coupling->is_held() || !coupling->stiffness.isZero(0))
+      supported.insert(coupling->surfaces.begin(), coupling->surfaces.end());
+  for (const FacetId f : mesh.live_facets())
+    if (supported.contains(mesh.facet_tag(f))) fixed.insert(part[mesh.facet(f)[0]]);
   for (const CellId c : mesh.live_cells()) {
     if (fixed.contains(part[mesh.cell(c)[0]])) continue;
     loose.insert(part[mesh.cell(c)[0]]);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "commands.hpp"
 #include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 
 #include <fmt/format.h>
 
@@ -168,6 +169,10 @@ class Explanation {
                               cavity.bulk_modulus > 0 ? "fluid" : fmt::format("gas, exponent {}", cavity.exponent));
     term("cavities", !setup_.cavities.empty(),
          setup_.cavities.empty() ? "no /boundary_conditions/pressure_cavity" : cavities);
+    const std::size_t springs = springs_of<Dim>(setup_.nodal_loads).size();
+    const std::size_t points = couplings_of<Dim>(setup_.nodal_loads).size();
+    if (springs > 0) term("springs", true, std::to_string(springs) + " of /springs");
+    if (points > 0) term("points", true, std::to_string(points) + " of /couplings");
     term("ties", !setup_.ties.empty(), setup_.ties.empty() ? "no /ties" : std::to_string(setup_.ties.size()) + " pairs");
     term("contact", setup_.contact.enabled,
          !setup_.contact.enabled     ? "/contact/enabled is false"
