@@ -164,9 +164,9 @@ void check_surface(const FrameSurface<3>& surface, const std::string& name, std:
 }
 
 /// Finds vertices inside of bodies, where no surfaces cross. A surface of obstacles may hold bodies: it is a container.
-/// `in_hollows`: vertices that chords have inside and curves have not.
+/// `beyond_chords`: vertices that curves have on the other side of the surface than chords.
 template <int Dim>
-void check_insides(const FrameSurface<Dim>& surface, const std::set<int>& in_hollows, const std::string& name,
+void check_insides(const FrameSurface<Dim>& surface, const std::set<int>& beyond_chords, const std::string& name,
                    std::vector<Violation>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
   const std::string what = surface.has_proxy ? "the proxy" : "a body";
@@ -174,7 +174,7 @@ void check_insides(const FrameSurface<Dim>& surface, const std::set<int>& in_hol
   for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
     if (closed.is_vertex(v)) continue;
     const bool touches = closed.touches(surface.x[v]);
-    if (touches || (closed.winding(surface.x[v]) + static_cast<int>(in_hollows.count(v))) % 2 != 0)
+    if (touches || (closed.winding(surface.x[v]) + static_cast<int>(beyond_chords.count(v))) % 2 != 0)
       violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v),
                                                       touches ? "on" : "inside of", what)});
   }
@@ -240,7 +240,7 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   check_surface(surface, name, violations);
   Patches<Dim> curves;
   if (!surface.curved.empty()) curves = true_surface(frame, surface);
-  if (violations.size() == before) check_insides(surface, find_in_hollows(surface, curves), name, violations);
+  if (violations.size() == before) check_insides(surface, find_beyond_chords(surface, curves), name, violations);
   check_overlap(frame, surface, name, certificate);
   check_curves(surface, curves, name, violations);
   measure_overhangs(frame, surface, certificate);
