@@ -198,6 +198,26 @@ TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouch) {
   EXPECT_EQ(other.state().chords, simulation.state().chords);
 }
 
+/// A barrier so soft that gaps are smaller than curves leave the shortest chords by becomes stiffer.
+TYPED_TEST(Chords, KeepCurvesOutOfWhatTheyTouchBehindASoftBarrier) {
+  constexpr int Dim = TypeParam::value;
+  itr::Setup<Dim> setup = pressed_ball<Dim>(Dim == 2 ? 3 : 2, Dim == 2 ? 20 : 4);
+  setup.contact.barrier_stiffness = 10;
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry), other(setup, registry);
+  while (!simulation.finished()) {
+    const StepResult result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    const State<Dim>& state = simulation.state();
+    EXPECT_LE(find_chord_demand(setup, state.mesh, state.chords, state.history.x[0]).excess, 1) << state.step;
+    EXPECT_EQ(depth_in_plates(state), 0) << state.step;
+    if (2 * state.step == setup.time.steps) other.restore(State<Dim>(state));
+  }
+  EXPECT_GT(simulation.state().stiffness.value, setup.contact.barrier_stiffness);
+  while (!other.finished()) ASSERT_TRUE(other.advance().ok);
+  EXPECT_EQ(other.state().history.x[0], simulation.state().history.x[0]);
+}
+
 /// Lets one edge of a ball at rest come down beside a plate.
 TEST(ChordBound, CountsWhatIsNearACurve) {
   itr::Setup<2> setup = pressed_ball<2>(1, 4);
