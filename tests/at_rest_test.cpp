@@ -301,6 +301,42 @@ TEST(Resolution, OfALongStepIsThatOfTheBodyAtRestWhereConditionsHoldIt) {
   }
 }
 
+/// Forces on points and strains of heat count as tractions do.
+TEST(Resolution, IsThatOfAllThatActs) {
+  const auto count = [](double force, double strain) {
+    auto setup = plain_square(1, 1e6);
+    hold(setup, 1);
+    VectorX forces = VectorX::Zero(2 * setup.mesh.num_vertices());
+    forces[forces.size() - 1] = force;
+    setup.nodal_loads.push_back(point_forces(setup.mesh, forces));
+    setup.materials[1].eigenstrain = [=](const Vec<3>&, double) -> Mat<3> { return strain * Mat<3>::Identity(); };
+    setup.time.quasistatic = true;
+    linear::Registry registry;
+    std::vector<std::string> found;
+    cli::find_unresolved(Simulation<2>(setup, registry), found);
+    return found.size();
+  };
+  EXPECT_EQ(count(0, 0), 0u);
+  EXPECT_EQ(count(1, 0), 0u);
+  EXPECT_EQ(count(1e-7, 0), 1u) << "a strain of 1e-13";
+  EXPECT_EQ(count(0, 1e-3), 0u);
+  EXPECT_EQ(count(0, 1e-14), 1u);
+}
+
+/// Motions between the first step and the last one count where these two move nothing.
+TEST(Resolution, OfWhatMovesLaterIsThatOfItsMotion) {
+  for (const double motion : {1e-2, 1e-14}) {
+    auto setup = plain_square(1, 1e6);
+    hold(setup, 1);
+    setup.dirichlet.push_back({3, {true, true}, [=](const Vec<2>&, double t) { return Vec<2>(t > 1.5 ? motion : 0, 0); }});
+    setup.time = {.quasistatic = true, .dt = 1, .steps = 3};
+    linear::Registry registry;
+    std::vector<std::string> found;
+    cli::find_unresolved(Simulation<2>(setup, registry), found);
+    EXPECT_EQ(found.size(), motion < 1e-10 ? 1u : 0u);
+  }
+}
+
 TEST(Resolution, WithoutInertiaIsNoMatterOfAVelocity) {
   auto setup = plain_square(1, 1e6);
   setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(1, 0); }});

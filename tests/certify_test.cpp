@@ -343,6 +343,51 @@ TEST_F(CertifyTest, LetsTipsReachIntoDentsOfCurves) {
   }
 }
 
+/// Points between a curved face and its chords, in a hollow and in a bulge.
+TEST_F(CertifyTest, TellsOnWhichSideOfACurvedFacePointsAre) {
+  Solid solid;
+  solid.mesh = Mesh<3>({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2, 3}}, {1});
+  solid.mesh.set_curved_edges({{0, 1}, {0, 2}, {1, 2}});
+  solid.obstacle_edges.clear();
+  solid.obstacle_triangles.clear();
+  solid.density = {0};
+  solid.v = VectorX::Zero(21);
+  const auto is_certified = [&](double middle, double height) {
+    solid.x.resize(21);
+    for (int i = 0; i < 4; ++i) vertex_of<3>(solid.x, i) = solid.mesh.rest(i);
+    vertex_of<3>(solid.x, solid.mesh.node_of(0, 1)) = Vec<3>(0.5, 0, middle);
+    vertex_of<3>(solid.x, solid.mesh.node_of(0, 2)) = Vec<3>(0, 0.5, middle);
+    vertex_of<3>(solid.x, solid.mesh.node_of(1, 2)) = Vec<3>(0.5, 0.5, middle);
+    solid.obstacle_x = {{1. / 3, 1. / 3, height}};
+    return violations_of(solid).empty();
+  };
+  // In the middle the face is at 4/3 of its nodes' height, its chords at that height.
+  for (const double beside : {1e-6, 0.03}) {
+    EXPECT_TRUE(is_certified(0.1, 0.4 / 3 - beside)) << "hollow";
+    EXPECT_FALSE(is_certified(0.1, 0.4 / 3 + beside)) << "hollow";
+    EXPECT_TRUE(is_certified(-0.1, -0.4 / 3 - beside)) << "bulge";
+    EXPECT_FALSE(is_certified(-0.1, -0.4 / 3 + beside)) << "bulge";
+  }
+  EXPECT_FALSE(is_certified(0.1, 0.4 / 3)) << "on the face";
+
+  solid.mesh = Mesh<3>({{0, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {0.5, 0.5, 1}}, {{0, 1, 2, 4}, {1, 0, 3, 4}}, {1, 1});
+  solid.mesh.set_curved_edges({{0, 1}});
+  solid.density = {0, 0};
+  solid.v = VectorX::Zero(18);
+  const auto is_certified_at_edge = [&](double middle, double height) {
+    solid.x.resize(18);
+    for (int i = 0; i < 5; ++i) vertex_of<3>(solid.x, i) = solid.mesh.rest(i);
+    vertex_of<3>(solid.x, 5) = Vec<3>(0.5, 0.5, middle);
+    solid.obstacle_x = {{0.25, 0.25, height}};
+    return violations_of(solid).empty();
+  };
+  // The edge is at 3/4 of its node's height there, its chord at half.
+  EXPECT_TRUE(is_certified_at_edge(0.1, 0.07)) << "in the plane between a curved edge and its chord";
+  EXPECT_FALSE(is_certified_at_edge(0.1, 0.08));
+  EXPECT_TRUE(is_certified_at_edge(-0.1, -0.08));
+  EXPECT_FALSE(is_certified_at_edge(-0.1, -0.07));
+}
+
 /// The curved edge 0 1 pierces the facet 2 3 4, which shares a vertex with each of the two facets beside that edge.
 TEST_F(CertifyTest, FindsACurvedEdgeInAFacetThatNeighboursBothOfItsOwn) {
   Solid solid;

@@ -171,7 +171,7 @@ void check_insides(const FrameSurface<Dim>& surface, const Patches<Dim>& curves,
                    std::vector<Violation>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
   const std::vector<char> doubtful = find_doubtful(surface, curves, closed);
-  const std::set<int> in_hollows = find_in_hollows(surface, curves);
+  const std::set<int> beyond_chords = find_beyond_chords(surface, curves);
   const std::vector<int> part = connected_parts<2>(surface.x.size(), surface.edges);
   std::vector<char> is_part_known(surface.x.size(), 0);
   for (std::size_t v = 0; v < part.size(); ++v)
@@ -181,7 +181,7 @@ void check_insides(const FrameSurface<Dim>& surface, const Patches<Dim>& curves,
   for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
     if (closed.is_vertex(v) || (doubtful[v] != 0 && is_part_known[part[v]] != 0)) continue;
     const bool touches = closed.touches(surface.x[v]);
-    if (touches || (closed.winding(surface.x[v]) + static_cast<int>(in_hollows.count(v))) % 2 != 0)
+    if (touches || (closed.winding(surface.x[v]) + static_cast<int>(beyond_chords.count(v))) % 2 != 0)
       violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v),
                                                       touches ? "on" : "inside of", what)});
   }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "curve_checks.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include "fem/chords.hpp"
 
 namespace itr::output {
@@ -39,6 +43,82 @@ void for_each_beyond_chord(const FrameSurface<2>& surface, const Patches<2>& all
       for (const auto& half : halves)
         if (is_beyond_chord(half, p)) visit(other[0], i, orientation(half.at[0][0], half.at[1][1], half.at[0][1]) > 0);
     }
+  }
+}
+
+/// Solid angle of a triangle seen from p (van Oosterom & Strackee 1983).
+double solid_angle(const Vec<3>& p, Vec<3> a, Vec<3> b, Vec<3> c) {
+  a -= p, b -= p, c -= p;
+  const double la = a.norm(), lb = b.norm(), lc = c.norm();
+  return 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+}
+
+/// Whether control points, of a patch that leaves its flat simplex by up to `bulge`, are so far from p that this simplex has
+/// its solid angle.
+template <typename Points>
+bool is_flat_from(const Vec<3>& p, const Points& control, double bulge) {
+  constexpr double kAngle = 1e-3;  ///< that the patch may be off by
+  Box<3> box;
+  for (const Vec<3>& q : control) box.include(q);
+  const Vec<3> away = (box.min - p).cwiseMax(p - box.max).cwiseMax(0);
+  return bulge * (box.max - box.min).norm() <= kAngle * away.squaredNorm();
+}
+
+/// Solid angle of the plane part between a quadratic curve, from a to b with the control point c, and the chord of its ends.
+double solid_angle_of_lens(const Vec<3>& p, const Vec<3>& a, const Vec<3>& c, const Vec<3>& b, int depth = 48) {
+  if (depth == 0 || is_flat_from(p, std::array{a, c, b}, (c - (a + b) / 2).norm())) return 0;
+  const Vec<3> left = (a + c) / 2, right = (c + b) / 2, middle = (left + right) / 2;
+  return solid_angle(p, a, middle, b) + solid_angle_of_lens(p, a, left, middle, depth - 1) +
+         solid_angle_of_lens(p, middle, right, b, depth - 1);
+}
+
+double solid_angle(const Vec<3>& p, const QuadraticPatch<3>& patch, int depth = 48) {
+  const auto& at = patch.at;
+  double bulge = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < i; ++j) bulge = std::max(bulge, (at[i][j] - (at[i][i] + at[j][j]) / 2).norm());
+  if (depth == 0 || is_flat_from(p, std::array{at[0][0], at[1][1], at[2][2], at[0][1], at[1][2], at[0][2]}, bulge))
+    return solid_angle(p, at[0][0], at[1][1], at[2][2]);
+  double sum = 0;
+  for (const auto& part : parts_of(patch)) sum += solid_angle(p, part, depth - 1);
+  return sum;
+}
+
+/// Solid angle of a patch less those of its chords through the nodes and of the plane parts between both of each edge.
+/// Neighbours share these plane parts, with the same bits, so that the sum is what curves wind around p more than chords.
+double solid_angle_beyond_chords(const FrameSurface<3>& surface, const std::array<int, 3>& facet,
+                                 const QuadraticPatch<3>& patch, const Vec<3>& p) {
+  const auto& x = surface.x;
+  double angle = solid_angle(p, patch);
+  for_each_chord<3>(
+      facet, [&](int a, int b) { return surface.node_of(a, b); },
+      [&](const std::array<int, 3>& chord) { angle -= solid_angle(p, x[chord[0]], x[chord[1]], x[chord[2]]); });
+  for (int k = 0; k < 3; ++k) {
+    const bool is_ascending = facet[k] < facet[(k + 1) % 3];
+    const int i = is_ascending ? k : (k + 1) % 3, j = is_ascending ? (k + 1) % 3 : k;
+    const Vec<3>&a = patch.at[i][i], &c = patch.at[i][j], &b = patch.at[j][j];
+    const Vec<3> left = (a + c) / 2, right = (c + b) / 2, middle = (left + right) / 2;
+    const double of_edge = solid_angle_of_lens(p, a, left, middle) + solid_angle_of_lens(p, middle, right, b);
+    angle -= is_ascending ? of_edge : -of_edge;
+  }
+  return angle;
+}
+
+/// Calls visit(vertex) for obstacles' vertices that curves have on another side than their chords through the nodes.
+template <typename Visit>
+void for_each_beyond_chord(const FrameSurface<3>& surface, const Patches<3>& all, const Visit& visit) {
+  std::vector<Box<3>> boxes(all.patches.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i)
+    if (all.is_curved[i])
+      for (const auto& row : all.patches[i].at)
+        for (const Vec<3>& p : row) boxes[i].include(p);
+  for (int v = surface.num_body_vertices; v < static_cast<int>(surface.x.size()); ++v) {
+    const Vec<3>& p = surface.x[v];
+    double angle = 0;
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+      if (all.is_curved[i] && (p.array() >= boxes[i].min.array()).all() && (p.array() <= boxes[i].max.array()).all())
+        angle += solid_angle_beyond_chords(surface, all.facets[i], all.patches[i], p);
+    if (std::lround(angle / (4 * M_PI)) % 2 != 0) visit(v);
   }
 }
 
@@ -97,12 +177,14 @@ std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<
 }
 
 template <int Dim>
-std::set<int> find_in_hollows([[maybe_unused]] const FrameSurface<Dim>& surface, [[maybe_unused]] const Patches<Dim>& all) {
+std::set<int> find_beyond_chords(const FrameSurface<Dim>& surface, const Patches<Dim>& all) {
   std::set<int> found;
   if constexpr (Dim == 2)
     for_each_beyond_chord(surface, all, [&](int vertex, std::size_t, bool is_hollow) {
       if (is_hollow) found.insert(vertex);
     });
+  else
+    for_each_beyond_chord(surface, all, [&](int vertex) { found.insert(vertex); });
   return found;
 }
 
@@ -172,7 +254,7 @@ void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surfac
 #define ITR_INSTANTIATE(Dim)                                                                                              \
   template Patches<Dim> true_surface(const StoredFrame&, const FrameSurface<Dim>&);                                       \
   template std::vector<char> find_doubtful(const FrameSurface<Dim>&, const Patches<Dim>&, const ClosedSurface<Dim>&);     \
-  template std::set<int> find_in_hollows(const FrameSurface<Dim>&, const Patches<Dim>&);                                  \
+  template std::set<int> find_beyond_chords(const FrameSurface<Dim>&, const Patches<Dim>&);                               \
   template void check_curves(const FrameSurface<Dim>&, const Patches<Dim>&, const std::string&, std::vector<Violation>&); \
   template void measure_overhangs(const StoredFrame&, const FrameSurface<Dim>&, Certificate&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

@@ -28,9 +28,10 @@ Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& sur
 template <int Dim>
 std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const ClosedSurface<Dim>& closed);
 
-/// Vertices that chords have inside of a body and curves have not. None in 3D, which is the safe side.
+/// Obstacles' vertices that curves have on another side than the chords through the nodes; in 2D those that chords have
+/// inside of a body and curves have not, since check_curves finds the others.
 template <int Dim>
-std::set<int> find_in_hollows(const FrameSurface<Dim>& surface, const Patches<Dim>& all);
+std::set<int> find_beyond_chords(const FrameSurface<Dim>& surface, const Patches<Dim>& all);
 
 /// Proves by Bernstein bounds that true curves meet nothing. Neighbours in the surface are left to the cells.
 template <int Dim>

@@ -81,6 +81,12 @@ struct FrameSurface {
     return simplex[0] >= num_body_vertices;
   }
   bool is_node(int v) const { return v >= num_body_vertices - static_cast<int>(curved.size()) && v < num_body_vertices; }
+  /// The node of an edge between two vertices of bodies; kNone where it is straight.
+  int node_of(int a, int b) const {
+    const auto at = std::lower_bound(curved.begin(), curved.end(), edge_key(a, b));
+    const int index = static_cast<int>(at - curved.begin()), count = static_cast<int>(curved.size());
+    return index < count && *at == edge_key(a, b) ? num_body_vertices - count + index : kNone;
+  }
   /// Corners of the facet or edge that a chord is a part of.
   template <std::size_t N>
   std::vector<int> corners_of(const std::array<int, N>& chord) const {

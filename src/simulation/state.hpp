@@ -27,7 +27,7 @@ struct State {
   History history;  ///< history.x[0] is the present
   int step = 0;
   double t = 0;                 ///< [s]
-  BarrierStiffness stiffness;   ///< where it is adaptive
+  BarrierStiffness stiffness;   ///< where it is adaptive, or was raised so that curves stay near their chords
   QuadratureLevels quadrature;  ///< of the elastic energy, by cell with curved edges
   ChordLevels chords;           ///< that contact acts on
   RemeshMemory remesh_memory;   ///< operations that remeshing refused and need not try again

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -235,32 +236,41 @@ class StepSolver {
                                                   next_.quadrature, next_.chords);
   }
 
-  /// Solves from x, and again from there with more chords as long as curves leave theirs too far. Where curves reach into
-  /// what they touch all the same, this is no solution.
+  /// Solves from x, and again from there as long as curves leave their chords too far: with more chords, and where there are
+  /// no more, with a stiffer barrier, since gaps of a soft one are next to nothing where bodies are pressed hard. Where
+  /// curves reach into what they touch all the same, this is no solution.
   NewtonSummary solve_between_chords(const VectorX& expected = {}) {
-    constexpr int kMostSolves = 8;
+    constexpr int kMostSolves = 12;
+    constexpr double kLessByStiffness = 0.75;  ///< of the excess, that a stiffer barrier has to leave at most
     const VectorX start = x_;
     make_problem();
     NewtonSummary summary = solve(expected);
     ChordDemand demand{{}, 0};
+    double excess = std::numeric_limits<double>::infinity();
     for (int solves = 1; summary.converged(); ++solves) {
       demand = find_chord_demand(setup_, next_.mesh, next_.chords, x_);
-      if (demand.excess <= 1 || demand.levels == next_.chords || solves == kMostSolves || !may_have(demand.levels, start))
+      const bool has_more = demand.levels != next_.chords;
+      if (demand.excess <= 1 || solves == kMostSolves || (has_more && !may_have(demand.levels, start)) ||
+          (!has_more && (demand.excess > kLessByStiffness * excess || !may_stiffen())))
         break;  // Watch tells of what is left
       ChordLevels fewer = std::exchange(next_.chords, demand.levels);
+      const BarrierStiffness softer = next_.stiffness;
+      if (!has_more) stiffen();
+      excess = has_more ? std::numeric_limits<double>::infinity() : demand.excess;
       VectorX solution = std::exchange(x_, start);  // where the next solve begins, if the way there is free
       auto problem_before = std::move(problem_);
       make_problem();
-      NewtonSummary with_more = solve(solution);
-      if (!with_more.converged() && with_more.termination != Termination::cancelled) {
-        tools_.logger.info(fmt::format("step {}: keeping the chords of curved edges, the step with more of them failed: {}",
-                                       next_.step, reason_of(with_more)));
+      NewtonSummary again = solve(solution);
+      if (!again.converged() && again.termination != Termination::cancelled) {
+        tools_.logger.info(fmt::format("step {}: keeping the chords of curved edges, the step with {} failed: {}",
+                                       next_.step, has_more ? "more of them" : "a stiffer barrier", reason_of(again)));
         next_.chords = std::move(fewer);
+        next_.stiffness = softer;
         x_ = std::move(solution);
         problem_ = std::move(problem_before);
         break;
       }
-      summary = with_more;
+      summary = again;
     }
     if (summary.converged() && demand.excess > 1 && !are_curves_apart(setup_, next_.mesh, next_.chords, x_)) {
       summary.termination = Termination::infeasible;
@@ -273,12 +283,37 @@ class StepSolver {
     return summary;
   }
 
+  static constexpr double kStiffer = 4, kMostStiffer = 4096;  ///< times a barrier stiffness, at once and in all
+  bool may_stiffen() const {
+    return !setup_.contact.adaptive_stiffness &&
+           kStiffer * problem_->stiffness().value <= kMostStiffer * setup_.contact.barrier_stiffness;
+  }
+  void stiffen() {
+    const double stiffness = kStiffer * problem_->stiffness().value;
+    next_.stiffness = {.value = stiffness, .largest = stiffness};
+  }
+
   /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
     const ContactSurface<Dim> contact =
         contact_surface(setup_, next_.mesh, levels, static_cast<int>(next_.history.x.size()));
     const auto is_free = [&](const VectorX& at) { return !has_intersection<Dim>(contact.surface, contact.positions(at)); };
     return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
+  }
+
+  /// By how much curves leave their chords, relative to what they may.
+  double excess_of_curves(const State<Dim>& state, const VectorX& x) const {
+    return find_chord_demand(setup_, state.mesh, state.chords, x).excess;
+  }
+
+  /// Why the solution on another mesh is no state to go on from; empty where it is one. Curves that leave their chords too
+  /// far may do so if they did on the mesh before.
+  std::string find_invalid() const {
+    std::string violation = find_violation(setup_, next_, x_);
+    if (!violation.empty()) return violation;
+    const double excess = excess_of_curves(next_, x_);
+    if (excess <= 1 || (first_ && excess <= excess_of_curves(first_->state, first_->x))) return "";
+    return "curved edges leave their chords too far";
   }
 
   /// Gives the curves of another mesh the chords that they ask for. Remeshing lets chords touch, not curves: where more
@@ -375,7 +410,7 @@ class StepSolver {
     settle_chords();
     const NewtonSummary summary = solve_between_chords();
     if (summary.termination == Termination::cancelled) return failed(summary);
-    std::string reason = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
+    std::string reason = summary.converged() ? find_invalid() : reason_of(summary);
     if (reason.empty()) return std::nullopt;
     return StepFailure{.kind = StepFailure::Kind::remeshed_unsolved,
                        .reason = std::move(reason),
@@ -412,7 +447,7 @@ class StepSolver {
         settle_chords();
         const NewtonSummary summary = solve_between_chords();
         if (summary.termination == Termination::cancelled) return summary;
-        failure = summary.converged() ? find_violation(setup_, next_, x_) : reason_of(summary);
+        failure = summary.converged() ? find_invalid() : reason_of(summary);
       }
       if (!failure.empty()) {
         next_ = unchanged;

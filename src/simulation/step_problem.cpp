@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
@@ -129,7 +130,10 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       return sum;
     };
   if (setup.contact.enabled) {
-    if (!setup.contact.adaptive_stiffness) stiffness_.value = setup.contact.barrier_stiffness;
+    if (!setup.contact.adaptive_stiffness) {
+      const bool is_raised = std::isfinite(stiffness.largest);
+      stiffness_.value = std::max(setup.contact.barrier_stiffness, is_raised ? stiffness.value : 0);
+    }
     potential_.add_contact(surface_.surface, stiffness_.value, surface_.map);
     if (setup.contact.adaptive_stiffness)
       adaptive_ = std::make_unique<AdaptiveStiffness<Dim>>(surface_.surface, setup.contact, average_mass(), terms_.scaling,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "resolution.hpp"
-#include "energy/rigid_body.hpp"
 
 #include <fmt/format.h>
 
@@ -8,6 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "energy/energy.hpp"
+#include "energy/rigid_body.hpp"
+#include "fem/cell_set.hpp"
 #include "simulation/sizes.hpp"
 
 namespace itr::cli {
@@ -25,15 +27,69 @@ struct Actions {
   double displacement = 0;  ///< prescribed [m]
   double acceleration = 0;  ///< [m/s^2]
   double traction = 0;      ///< [Pa]
-  bool is_any() const { return std::max({speed, motion, displacement, acceleration, traction}) > 0; }
+  double force = 0;         ///< on a node [N]
+  double eigenstrain = 0;
+  bool is_any() const { return std::max({speed, motion, displacement, acceleration, traction, force, eigenstrain}) > 0; }
 };
+
+void raise(double& largest, double value) {
+  if (std::isfinite(value)) largest = std::max(largest, value);
+}
+
+template <int Dim>
+void add_nodal_loads(const Setup<Dim>& setup, double t, Actions& actions) {
+  if (setup.nodal_loads.empty()) return;
+  const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
+  VectorX x(Dim * cells.num_vertices), gradient = VectorX::Zero(x.size());
+  for (int v = 0; v < cells.num_vertices; ++v) vertex_of<Dim>(x, v) = cells.rest[v];
+  Workspace workspace;
+  for (const auto& load : setup.nodal_loads)
+    if (const auto energy = load(cells, t, 1)) energy->add_gradient(x, gradient, workspace);
+  for (int v = 0; v < cells.num_vertices; ++v) raise(actions.force, vertex_of<Dim>(gradient, v).norm());
+}
+
+template <int Dim>
+void add_eigenstrains(const Setup<Dim>& setup, double t, Actions& actions) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  for (const CellId c : mesh.live_cells()) {
+    const Material& material = setup.materials.at(mesh.body(c));
+    if (!material.eigenstrain) continue;
+    Vec<3> X = Vec<3>::Zero();
+    X.head<Dim>() = mesh.barycenter(c);
+    raise(actions.eigenstrain, material.eigenstrain(X, t).norm());
+  }
+}
+
+/// The largest that something held moves by between two of some times of the run [m].
+template <int Dim>
+double find_motion(const Setup<Dim>& setup) {
+  constexpr int kTimes = 64;
+  const TimeOptions& time = setup.time;
+  const int steps = time.steps - time.first_step, times = std::min(steps, kTimes);
+  const auto at = [&](int k) {
+    return time.time_after(time.first_step + static_cast<int>(static_cast<long long>(k) * steps / times));
+  };
+  double motion = 0;
+  const auto add = [&](const auto& moves, const RestPoint<Dim>& X) {
+    for (int k = 1; k <= times; ++k) raise(motion, (moves(X, at(k)) - moves(X, at(k - 1))).norm());
+  };
+  for (const auto& condition : setup.dirichlet) {
+    for (const VertexId v : setup.mesh.live_vertices())
+      if (condition.tag == setup.mesh.vertex_tag(v)) add(condition.displacement, setup.mesh.point(v));
+    for (const FacetId f : setup.mesh.live_facets())
+      if (condition.tag == setup.mesh.facet_tag(f)) add(condition.displacement, setup.mesh.point(setup.mesh.facet(f)[0]));
+  }
+  for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
+    if (const int moves = setup.obstacles.motion[o]; moves != kNone)
+      add(setup.obstacles.motions[moves], setup.obstacles.rest[o]);
+  return motion;
+}
 
 template <int Dim>
 void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   const Mesh<Dim>& mesh = setup.mesh;
-  const auto raise = [](double& largest, double value) {
-    if (std::isfinite(value)) largest = std::max(largest, value);
-  };
+  add_nodal_loads(setup, t, actions);
+  add_eigenstrains(setup, t, actions);
   const double before = std::max(setup.time.t0, t - setup.time.dt);
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.point(v), t).norm());
@@ -83,17 +139,21 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   const double farthest = history.x[0].head(bodies).template lpNorm<Eigen::Infinity>();
   const double spacing = kSpacing * farthest;
   double motion = actions.motion, strain = 0;
+  if (motion == 0 && !time.is_static && time.steps > 2) motion = find_motion(setup);
   if (!first.is_any()) first = actions;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (rigid_body_of(material)) continue;
-    const double length = size.diagonal, stress = actions.traction + material.density * actions.acceleration * length;
+    const double length = size.diagonal;
+    const auto traction = [length](const Actions& of) { return of.traction + of.force / std::pow(length, Dim - 1); };
+    const double stress = traction(actions) + material.density * actions.acceleration * length;
     const double of_load = stress / material.youngs_modulus;
-    strain = std::max({strain, of_load, actions.displacement / length,
+    strain = std::max({strain, of_load, actions.displacement / length, actions.eigenstrain,
                        actions.speed / std::sqrt(material.youngs_modulus / material.density)});
     const double at_rest =
-        (first.traction + material.density * first.acceleration * length) / material.youngs_modulus * length;
-    const double in_flight = time.dt * time.dt * (first.acceleration + first.traction / (material.density * length));
+        ((traction(first) + material.density * first.acceleration * length) / material.youngs_modulus + first.eigenstrain) *
+        length;
+    const double in_flight = time.dt * time.dt * (first.acceleration + traction(first) / (material.density * length));
     if (!time.has_inertia())
       motion = std::max(motion, at_rest);
     else
