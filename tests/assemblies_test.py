@@ -55,6 +55,13 @@ class Assemblies(unittest.TestCase):
                 self.assertFalse(keys(json.loads(scene.read_text())) & OF_METHOD)
                 call("explain", scene)
 
+    def test_a_solid_press_fit_with_flush_sides_begins(self):
+        """Its edges, which lie in the flush sides of both rings, once were pushed out through these sides and never apart."""
+        call("run", self.folder / "press_fit_3d.json", "-o", self.folder / "solid", "--threads", 1)
+        call("certify", self.folder / "solid")
+        pressure = study.STUDIES["press_fit_3d"][0](self.folder / "solid")["pressure"]
+        self.assertAlmostEqual(pressure / study.LAME["pressure"], 1, delta=0.4)  # facets sag by 0.4 of the overlap
+
     def test_short_ones_meet_their_references(self):
         for name, most in (("press_fit_axisymmetric", 0.5), ("shrink_fit", 0.5), ("laid_down", 1), ("rubber_mount", 3)):
             with self.subTest(name), open(HERE / "study" / f"{name}.csv", newline="") as file:

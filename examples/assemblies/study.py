@@ -105,7 +105,7 @@ STUDIES = {  # what is measured, and a function (folder, finest refinement, fine
     "press_fit": (pressure_of(FIT), lambda *_: LAME),
     "press_fit_moved": (pressure_of(FIT), lambda *_: LAME),
     "press_fit_axisymmetric": (pressure_of(2 * math.pi * FIT * 10), lambda *_: LAME),
-    "press_fit_3d": (pressure_of(FIT), lambda *_: LAME),
+    "press_fit_3d": (pressure_of(FIT / 2), lambda *_: LAME),
     "shrink_fit": (shrink_fit, lambda *_: LAME | {"rim": rim_growth(LAME["pressure"]) - (OVERLAP + 0.002) / FIT * RIM}),
     "snap_hook": (hook, hook_of_peer),
     "gripper": (grip, grip_of_peer),
