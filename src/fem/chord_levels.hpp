@@ -10,6 +10,6 @@ namespace itr {
 /// chord is.
 using ChordLevels = std::vector<std::uint8_t>;
 template <int Dim>
-inline constexpr int kMostHalvings = Dim == 2 ? 10 : 5;  ///< of a chord
+inline constexpr int kMostHalvings = Dim == 2 ? 10 : 4;  ///< of a chord
 
 }  // namespace itr
