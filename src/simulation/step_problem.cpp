@@ -129,6 +129,12 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       for (const int body : loaded) sum->add(rigid_load(body, x, t));
       return sum;
     };
+  coupled_ = std::make_unique<const CoupledPoints<Dim>>(setup, terms_, scope_->coupled, history);
+  for (Constraint* constraint : coupled_->constraints()) constraints_.push_back(constraint);
+  if (!coupled_->empty())
+    terms_.follower = [this, others = terms_.follower](const VectorX& x) {
+      return coupled_->sum(x, others ? others(x) : nullptr);
+    };
   if (setup.contact.enabled) {
     if (!setup.contact.adaptive_stiffness) {
       const bool is_raised = std::isfinite(stiffness.largest);
@@ -143,12 +149,6 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   if (!history.v.empty() && setup.contact.has_static_friction()) start_velocity_ = history.v[0];
   potential_.elastic()->set_quadrature_levels(levels);
   add_ties(history);
-  coupled_ = std::make_unique<const CoupledPoints<Dim>>(setup, terms_, scope_->coupled, history);
-  for (Constraint* constraint : coupled_->constraints()) constraints_.push_back(constraint);
-  if (!coupled_->empty())
-    terms_.follower = [this, others = terms_.follower](const VectorX& x) {
-      return coupled_->sum(x, others ? others(x) : nullptr);
-    };
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, with_supports(setup, cells_, scope_->coupled, held_.held),
                                            setup.materials, tie_ ? tie_->bonds() : std::vector<std::vector<int>>());
