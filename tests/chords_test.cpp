@@ -221,7 +221,7 @@ TEST(ChordBound, HoldsBehindASoftBarrier) {
 /// Presses a ball by a barrier that gives way until gaps are narrower than the shortest chords allow: no step is taken.
 TEST(ChordBound, StopsStepsThatCurvesMayNotTake) {
   itr::Setup<2> setup = pressed_ball<2>(3, 20);
-  setup.contact.barrier_stiffness *= 1e-7;
+  setup.contact.barrier_stiffness *= 2e-6;
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
   StepResult result = simulation.advance();
