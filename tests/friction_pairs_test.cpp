@@ -225,7 +225,8 @@ TEST(FrictionPairs, ArePartOfRemeshing) {
   EXPECT_EQ(run(pairs), expected);
   itr::Setup<2> none = pairs;
   none.contact.friction_pairs[0].a = {.bodies = {7}};
-  EXPECT_NE(run(none), expected);
+  const VectorX without = run(none);
+  EXPECT_TRUE(without.size() != expected.size() || without != expected);
 }
 
 }  // namespace
