@@ -221,7 +221,7 @@ TEST(ChordBound, HoldsBehindASoftBarrier) {
 /// Presses a ball by a barrier that gives way until gaps are narrower than the shortest chords allow: no step is taken.
 TEST(ChordBound, StopsStepsThatCurvesMayNotTake) {
   itr::Setup<2> setup = pressed_ball<2>(3, 20);
-  setup.contact.barrier_stiffness *= 2e-6;
+  setup.contact.barrier_stiffness *= 2e-6;  // 4096 times as much is too little still
   linear::Registry registry;
   Simulation<2> simulation(setup, registry);
   StepResult result = simulation.advance();
@@ -271,6 +271,14 @@ TEST(ChordBound, CountsWhatIsNearACurve) {
   for (int round = 0; round < 4 && demand.excess > 1; ++round) demand = find_chord_demand(setup, mesh, demand.levels, x);
   EXPECT_LE(demand.excess, 1);
   EXPECT_EQ(std::count(demand.levels.begin(), demand.levels.end(), 0), mesh.num_curved() - 1);
+
+  // The chord from a to the node and the curve are 0.005 apart in its middle.
+  const Vec<2> middle = (vertex_of<2>(x, a) + vertex_of<2>(x, mesh.node_of(a, b))) / 2;
+  vertex_of<2>(x, mesh.num_nodes()) = middle - Vec<2>(0, 1);
+  for (const double tip : {0.006, 0.0025}) {
+    vertex_of<2>(x, mesh.num_nodes() + 1) = middle - Vec<2>(0, tip);
+    EXPECT_EQ(are_curves_apart(setup, mesh, {}, x), tip > 0.005);
+  }
 }
 
 }  // namespace

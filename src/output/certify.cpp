@@ -7,7 +7,6 @@
 #include <map>
 #include <optional>
 
-#include "core/connected_parts.hpp"
 #include "curve_checks.hpp"
 #include "fem/quadratic.hpp"
 #include "frame_surface.hpp"
@@ -165,21 +164,16 @@ void check_surface(const FrameSurface<3>& surface, const std::string& name, std:
 }
 
 /// Finds vertices inside of bodies, where no surfaces cross. A surface of obstacles may hold bodies: it is a container.
-/// Chords may have a vertex near a curve on the wrong side: others that surfaces connect it to are asked in its place.
+/// Chords through nodes may have a vertex near a curve on the wrong side.
 template <int Dim>
 void check_insides(const FrameSurface<Dim>& surface, const Patches<Dim>& curves, const std::string& name,
                    std::vector<Violation>& violations) {
   const ClosedSurface<Dim> closed(surface.x, surface.own_facets);
-  const std::vector<char> doubtful = find_doubtful(surface, curves, closed);
   const std::set<int> beyond_chords = find_beyond_chords(surface, curves);
-  const std::vector<int> part = connected_parts<2>(surface.x.size(), surface.edges);
-  std::vector<char> is_part_known(surface.x.size(), 0);
-  for (std::size_t v = 0; v < part.size(); ++v)
-    if (doubtful[v] == 0) is_part_known[part[v]] = 1;
   const std::string what = surface.has_proxy ? "the proxy" : "a body";
   const int first = surface.has_proxy ? 0 : surface.num_body_vertices;
   for (int v = first; v < static_cast<int>(surface.x.size()); ++v) {
-    if (closed.is_vertex(v) || (doubtful[v] != 0 && is_part_known[part[v]] != 0)) continue;
+    if (closed.is_vertex(v)) continue;
     const bool touches = closed.touches(surface.x[v]);
     if (touches || (closed.winding(surface.x[v]) + static_cast<int>(beyond_chords.count(v))) % 2 != 0)
       violations.push_back({Of::surfaces, fmt::format("{}: vertex ({}) is {} {}", name, surface.name(v),
@@ -187,7 +181,7 @@ void check_insides(const FrameSurface<Dim>& surface, const Patches<Dim>& curves,
   }
   if (surface.has_proxy) return;  // need not have an orientation that tells a solid from a cavity
   if (!surface.closed.empty()) return;
-  for (const int v : closed.nested(doubtful))
+  for (const int v : closed.nested(find_doubtful(surface, curves, closed)))
     violations.push_back(
         {Of::surfaces, fmt::format("{}: the part of the boundary at vertex {} is inside of a body", name, surface.name(v))});
 }
@@ -246,11 +240,11 @@ void check_frame(const StoredFrame& frame, const std::string& name, Certificate&
   const FrameSurface<Dim> surface = make_surface<Dim>(frame);
   check_surface(surface, name, violations);
   Patches<Dim> curves;
-  if (!surface.curved.empty()) curves = true_surface(frame, surface);
+  if (!surface.curved.empty()) curves = true_surface(surface);
   if (violations.size() == before) check_insides(surface, curves, name, violations);
   check_overlap(frame, surface, name, certificate);
   check_curves(surface, curves, name, violations);
-  measure_overhangs(frame, surface, certificate);
+  measure_overhangs(surface, certificate);
   certificate.flight = std::max(certificate.flight, flight<Dim>(frame));
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "fem/chords.hpp"
 
@@ -25,6 +26,33 @@ Box<Dim> box_of(const QuadraticPatch<Dim>& patch) {
     for (const Vec<Dim>& p : row) box.include(p);
   return box;
 }
+
+/// Finds the curved patches in the boxes of whose control points a point is.
+template <int Dim>
+class CurveTree {
+ public:
+  explicit CurveTree(const Patches<Dim>& all) {
+    std::vector<Box<Dim>> boxes;
+    for (std::size_t i = 0; i < all.patches.size(); ++i) {
+      if (!all.is_curved[i]) continue;
+      patches_.push_back(static_cast<int>(i));
+      boxes.push_back(box_of(all.patches[i]));
+    }
+    tree_.build(boxes);
+  }
+  /// Numbers in Patches, ascending.
+  std::vector<int> around(const Vec<Dim>& p) const {
+    std::vector<int> hits;
+    tree_.query({p, p}, hits);
+    for (int& hit : hits) hit = patches_[hit];
+    std::sort(hits.begin(), hits.end());
+    return hits;
+  }
+
+ private:
+  std::vector<int> patches_;
+  Bvh<Dim> tree_;
+};
 
 /// Calls visit(vertex, curve, is_hollow) for vertices between a curve and its chords, where neither is crossed. `is_hollow`:
 /// the curve lies on the body's side of the chord.
@@ -107,34 +135,27 @@ double solid_angle_beyond_chords(const FrameSurface<3>& surface, const std::arra
 /// Calls visit(vertex) for obstacles' vertices that curves have on another side than their chords through the nodes.
 template <typename Visit>
 void for_each_beyond_chord(const FrameSurface<3>& surface, const Patches<3>& all, const Visit& visit) {
-  std::vector<Box<3>> boxes(all.patches.size());
-  for (std::size_t i = 0; i < boxes.size(); ++i)
-    if (all.is_curved[i])
-      for (const auto& row : all.patches[i].at)
-        for (const Vec<3>& p : row) boxes[i].include(p);
+  const CurveTree<3> tree(all);
   for (int v = surface.num_body_vertices; v < static_cast<int>(surface.x.size()); ++v) {
-    const Vec<3>& p = surface.x[v];
     double angle = 0;
-    for (std::size_t i = 0; i < boxes.size(); ++i)
-      if (all.is_curved[i] && (p.array() >= boxes[i].min.array()).all() && (p.array() <= boxes[i].max.array()).all())
-        angle += solid_angle_beyond_chords(surface, all.facets[i], all.patches[i], p);
-    if (std::lround(angle / (4 * M_PI)) % 2 != 0) visit(v);
+    for (const int i : tree.around(surface.x[v]))
+      angle += solid_angle_beyond_chords(surface, all.facets[i], all.patches[i], surface.x[v]);
+    if (std::lround(angle / (4 * std::numbers::pi)) % 2 != 0) visit(v);
   }
 }
 
 }  // namespace
 
 template <int Dim>
-Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& surface) {
+Patches<Dim> true_surface(const FrameSurface<Dim>& surface) {
   Patches<Dim> result;
-  const CurvedNodes node_of(frame);
   const auto& x = surface.x;
   const auto add = [&](const std::array<int, Dim>& facet) {
     bool is_curved = false;
     std::array<Vec<Dim>, Dim> corners;
     for (int k = 0; k < Dim; ++k) corners[k] = x[facet[k]];
     result.patches.push_back(quadratic_patch<Dim>(corners, [&](int i, int j) -> Vec<Dim> {
-      const int node = surface.is_obstacle(facet) ? kNone : node_of(facet[i], facet[j]);
+      const int node = surface.is_obstacle(facet) ? kNone : surface.node_of(facet[i], facet[j]);
       is_curved = is_curved || node != kNone;
       return node != kNone ? x[node] : Vec<Dim>((corners[i] + corners[j]) / 2);
     }));
@@ -159,20 +180,11 @@ template <int Dim>
 std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<Dim>& all,
                                 const ClosedSurface<Dim>& closed) {
   std::vector<char> doubtful(surface.x.size(), 0);
-  std::vector<Box<Dim>> boxes;
-  std::vector<int> parts;
-  for (std::size_t i = 0; i < all.patches.size(); ++i) {
-    if (!all.is_curved[i]) continue;
-    parts.push_back(closed.part_of(all.facets[i][0]));
-    boxes.push_back(box_of(all.patches[i]));
-  }
-  const Bvh<Dim> tree(boxes);
-  std::vector<int> hits;
-  for (int v = 0; v < static_cast<int>(doubtful.size()); ++v) {
-    hits.clear();
-    tree.query({surface.x[v], surface.x[v]}, hits);
-    doubtful[v] = std::ranges::any_of(hits, [&](int i) { return parts[i] != closed.part_of(v); });
-  }
+  const CurveTree<Dim> tree(all);
+  for (int v = 0; v < static_cast<int>(doubtful.size()); ++v)
+    doubtful[v] = closed.is_vertex(v) && std::ranges::any_of(tree.around(surface.x[v]), [&](int i) {
+                    return closed.part_of(all.facets[i][0]) != closed.part_of(v);
+                  });
   return doubtful;
 }
 
@@ -218,16 +230,15 @@ void check_curves(const FrameSurface<Dim>& surface, const Patches<Dim>& all, con
 }
 
 template <int Dim>
-void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surface, Certificate& certificate) {
-  const CurvedNodes node_of(frame);
-  if (node_of.edges.empty() || surface.has_proxy) return;
+void measure_overhangs(const FrameSurface<Dim>& surface, Certificate& certificate) {
+  if (surface.curved.empty()) return;  // as with a proxy
   const auto& primitives = facets_of(surface);
   const Bvh<Dim> tree(boxes_of<Dim>(surface.x, primitives));
   const auto& x = surface.x;
   std::vector<int> hits;
   for (const auto& facet : surface.boundary)
     for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k) {
-      const int a = facet[k], b = facet[(k + 1) % Dim], node = node_of(a, b);
+      const int a = facet[k], b = facet[(k + 1) % Dim], node = surface.node_of(a, b);
       if (node == kNone) continue;
       std::array<Vec<Dim>, Dim> corners;
       for (int i = 0; i < Dim; ++i) corners[i] = x[facet[i]];
@@ -252,11 +263,11 @@ void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surfac
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                              \
-  template Patches<Dim> true_surface(const StoredFrame&, const FrameSurface<Dim>&);                                       \
+  template Patches<Dim> true_surface(const FrameSurface<Dim>&);                                                           \
   template std::vector<char> find_doubtful(const FrameSurface<Dim>&, const Patches<Dim>&, const ClosedSurface<Dim>&);     \
   template std::set<int> find_beyond_chords(const FrameSurface<Dim>&, const Patches<Dim>&);                               \
   template void check_curves(const FrameSurface<Dim>&, const Patches<Dim>&, const std::string&, std::vector<Violation>&); \
-  template void measure_overhangs(const StoredFrame&, const FrameSurface<Dim>&, Certificate&);
+  template void measure_overhangs(const FrameSurface<Dim>&, Certificate&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::output

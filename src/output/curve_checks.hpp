@@ -22,9 +22,10 @@ struct Patches {
 };
 
 template <int Dim>
-Patches<Dim> true_surface(const StoredFrame& frame, const FrameSurface<Dim>& surface);
+Patches<Dim> true_surface(const FrameSurface<Dim>& surface);
 
-/// By vertex: whether chords and curves may have it on different sides, as in the box of a curve's control points.
+/// By vertex of `closed`: whether chords and curves of other parts may have it on different sides, as in the box of a
+/// curve's control points.
 template <int Dim>
 std::vector<char> find_doubtful(const FrameSurface<Dim>& surface, const Patches<Dim>& all, const ClosedSurface<Dim>& closed);
 
@@ -40,6 +41,6 @@ void check_curves(const FrameSurface<Dim>& surface, const Patches<Dim>& all, con
 
 /// Fills in what curved edges do beyond their chords. Pieces of the surface around an edge do not count as something else.
 template <int Dim>
-void measure_overhangs(const StoredFrame& frame, const FrameSurface<Dim>& surface, Certificate& certificate);
+void measure_overhangs(const FrameSurface<Dim>& surface, Certificate& certificate);
 
 }  // namespace itr::output

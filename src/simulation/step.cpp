@@ -175,6 +175,7 @@ class StepSolver {
     State<Dim> state;
     VectorX x;
     std::unique_ptr<StepProblem<Dim>> problem;
+    double excess;
   };
 
   std::optional<StepFailure> solve_first() {
@@ -210,7 +211,7 @@ class StepSolver {
     }
     next_.stiffness = problem_->stiffness();
     next_.quadrature = problem_->quadrature_levels();
-    first_.emplace(next_, x_, std::move(problem_));
+    first_.emplace(next_, x_, std::move(problem_), excess_);
     return std::nullopt;
   }
 
@@ -271,13 +272,14 @@ class StepSolver {
         break;
       }
       summary = again;
+      if (!has_more) tell_of_stiffness();
     }
+    excess_ = demand.excess;
     if (summary.converged() && demand.excess > 1 && !are_curves_apart(setup_, next_.mesh, next_.chords, x_)) {
       summary.termination = Termination::infeasible;
       summary.message = fmt::format(
           "curved edges reach into what they touch, since they leave their shortest chords by {:.2g} times of what they "
-          "may: "
-          "a stiffer barrier, with wider gaps, or a finer mesh helps",
+          "may: a stiffer barrier, with wider gaps, or a finer mesh helps",
           demand.excess);
     }
     return summary;
@@ -292,6 +294,12 @@ class StepSolver {
     const double stiffness = kStiffer * problem_->stiffness().value;
     next_.stiffness = {.value = stiffness, .largest = stiffness};
   }
+  void tell_of_stiffness() const {
+    warn(
+        fmt::format("the barrier is {:g} times as stiff now as at the start, so that gaps are wide enough for the chords of "
+                    "curved edges; a larger /solver/contact/barrier_stiffness or a finer mesh does without",
+                    next_.stiffness.value / setup_.contact.barrier_stiffness));
+  }
 
   /// Whether surfaces with these levels of chords are apart at x, and at past positions.
   bool may_have(const ChordLevels& levels, const VectorX& x) const {
@@ -301,18 +309,11 @@ class StepSolver {
     return is_free(x) && std::all_of(next_.history.x.begin(), next_.history.x.end(), is_free);
   }
 
-  /// By how much curves leave their chords, relative to what they may.
-  double excess_of_curves(const State<Dim>& state, const VectorX& x) const {
-    return find_chord_demand(setup_, state.mesh, state.chords, x).excess;
-  }
-
   /// Why the solution on another mesh is no state to go on from; empty where it is one. Curves that leave their chords too
   /// far may do so if they did on the mesh before.
   std::string find_invalid() const {
     std::string violation = find_violation(setup_, next_, x_);
-    if (!violation.empty()) return violation;
-    const double excess = excess_of_curves(next_, x_);
-    if (excess <= 1 || (first_ && excess <= excess_of_curves(first_->state, first_->x))) return "";
+    if (!violation.empty() || excess_ <= std::max(1.0, first_ ? first_->excess : 1)) return violation;
     return "curved edges leave their chords too far";
   }
 
@@ -480,6 +481,7 @@ class StepSolver {
   State<Dim> next_;
   VectorX x_;  ///< the solution, on next_.mesh; before the first solve its start
   std::unique_ptr<StepProblem<Dim>> problem_;
+  double excess_ = 0;  ///< of the curves of the last solution over what they may leave their chords by
   EnergyGuard<Dim> guard_;
   AccuracyGuard<Dim> accuracy_;
   bool must_settle_;  ///< rounds of lagging, or the step is cut
