@@ -19,26 +19,22 @@ namespace itr {
 namespace {
 
 template <int Dim>
-Mesh<Dim> block_with_sides();
-
-template <>
-Mesh<2> block_with_sides<2>() {
-  const Grid grid = make_regular_grid(3, 1, [](int i, int j) { return (i + j) % 2 == 0; });
-  Mesh<2> mesh(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
-  tag_sides(mesh, 1);
-  return mesh;
-}
-
-template <>
-Mesh<3> block_with_sides<3>() {
-  std::mt19937 random(1);
-  Mesh<3> mesh = make_cube(2, random, 0.2);
-  for (const FacetId f : mesh.live_facets()) {
-    Vec<3> middle = Vec<3>::Zero();
-    for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / 3;
-    mesh.set_facet_tag(f, middle[0] > 1 - 1e-9 ? 3 : middle[1] > 1 - 1e-9 ? 4 : 1);
+Mesh<Dim> block_with_sides() {
+  if constexpr (Dim == 2) {
+    const Grid grid = make_regular_grid(3, 1, [](int i, int j) { return (i + j) % 2 == 0; });
+    Mesh<2> mesh(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
+    tag_sides(mesh, 1);
+    return mesh;
+  } else {
+    std::mt19937 random(1);
+    Mesh<3> mesh = make_cube(2, random, 0.2);
+    for (const FacetId f : mesh.live_facets()) {
+      Vec<3> middle = Vec<3>::Zero();
+      for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / 3;
+      mesh.set_facet_tag(f, middle[0] > 1 - 1e-9 ? 3 : middle[1] > 1 - 1e-9 ? 4 : 1);
+    }
+    return mesh;
   }
-  return mesh;
 }
 
 template <int Dim>

@@ -17,7 +17,7 @@ namespace itr {
 
 namespace {
 
-constexpr double kRoundOff = 1e-13;  ///< of the surface's size: less is not open
+constexpr double kRoundOff = 1e-13;  ///< of sizes and positions: less is not open, and no arm
 
 /// A block of the plane in a matrix of space.
 template <int Dim>
@@ -107,6 +107,7 @@ MatrixX SurfaceMean<Dim>::values(ConstVectorView field) const {
 template <int Dim>
 CoupledPoint<Dim>::CoupledPoint(const SurfaceMean<Dim>& mean, const Vec<3>& point) : mean_(mean) {
   arm_.head<Dim>() = point.head<Dim>() - mean.centroid;
+  if (arm_.norm() <= kRoundOff * (point.norm() + std::sqrt(mean.moments.trace()))) arm_.setZero();
 }
 
 template <int Dim>
