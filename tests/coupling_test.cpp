@@ -19,26 +19,22 @@ namespace itr {
 namespace {
 
 template <int Dim>
-Mesh<Dim> block_with_sides();
-
-template <>
-Mesh<2> block_with_sides<2>() {
-  const Grid grid = make_regular_grid(3, 1, [](int i, int j) { return (i + j) % 2 == 0; });
-  Mesh<2> mesh(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
-  tag_sides(mesh, 1);
-  return mesh;
-}
-
-template <>
-Mesh<3> block_with_sides<3>() {
-  std::mt19937 random(1);
-  Mesh<3> mesh = make_cube(2, random, 0.2);
-  for (const FacetId f : mesh.live_facets()) {
-    Vec<3> middle = Vec<3>::Zero();
-    for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / 3;
-    mesh.set_facet_tag(f, middle[0] > 1 - 1e-9 ? 3 : middle[1] > 1 - 1e-9 ? 4 : 1);
+Mesh<Dim> block_with_sides() {
+  if constexpr (Dim == 2) {
+    const Grid grid = make_regular_grid(3, 1, [](int i, int j) { return (i + j) % 2 == 0; });
+    Mesh<2> mesh(grid.rest, grid.cells, std::vector<int>(grid.cells.size(), 1));
+    tag_sides(mesh, 1);
+    return mesh;
+  } else {
+    std::mt19937 random(1);
+    Mesh<3> mesh = make_cube(2, random, 0.2);
+    for (const FacetId f : mesh.live_facets()) {
+      Vec<3> middle = Vec<3>::Zero();
+      for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / 3;
+      mesh.set_facet_tag(f, middle[0] > 1 - 1e-9 ? 3 : middle[1] > 1 - 1e-9 ? 4 : 1);
+    }
+    return mesh;
   }
-  return mesh;
 }
 
 template <int Dim>
@@ -113,8 +109,19 @@ TEST(CoupledPoint, MovesWithTheMeanOfItsSurface) {
   expect_means(curved);
 }
 
+/// Increments give the energy and its gradient up to a constant value.
+template <typename Term>
+void expect_increments(const Term& energy, const VectorX& base, const VectorX& x) {
+  Workspace workspace;
+  VectorX gradient = VectorX::Zero(x.size());
+  energy.add_gradient_at({base, x - base}, gradient, workspace);
+  EXPECT_LE((gradient - gradient_of(energy, x)).norm(), 1e-13 * gradient.norm());
+  EXPECT_NEAR(energy.value_at({base, x - base}, workspace) - energy.value_at({base, 0 * x}, workspace),
+              energy.value(x, workspace) - energy.value(base, workspace), 1e-13);
+}
+
 template <int Dim>
-void expect_coupling(const Mesh<Dim>& mesh, bool is_rigid) {
+void expect_coupling(const Mesh<Dim>& mesh, bool is_rigid, const std::array<bool, 3>& rotation) {
   const CellSet<Dim> cells = whole_mesh(mesh, {});
   const SurfaceMean<Dim> mean(cells, std::vector<int>{3});
   const CoupledPoint<Dim> point(mean, Vec<3>(1.5, 0.2, Dim == 3 ? 0.6 : 0));
@@ -126,7 +133,7 @@ void expect_coupling(const Mesh<Dim>& mesh, bool is_rigid) {
   if (Dim == 3) terms.couple << 0.2, 0.5, -0.3, 0.4, -0.1, 0.6, 0.7, 0.2, 0.1;
   terms.moment = Dim == 2 ? 0.8 : 0;
   terms.turn = 0.2;
-  HeldPoint<Dim> held{.is_rigid = is_rigid, .position = {true, false, Dim == 3}, .rotation = {Dim == 3, false, true}};
+  HeldPoint<Dim> held{.is_rigid = is_rigid, .position = {true, false, Dim == 3}, .rotation = rotation};
   held.displacement.setConstant(0.1);
   held.turned = Eigen::AngleAxisd(0.3, Vec<3>(0, 0, 1)).toRotationMatrix();
   held.stiffness = 3;
@@ -135,11 +142,7 @@ void expect_coupling(const Mesh<Dim>& mesh, bool is_rigid) {
   energy.update({rest, other - rest});
   expect_derivatives(energy, x, 1e-5, 1e-7);
   expect_psd(energy, x);
-  Workspace workspace;
-  VectorX gradient = VectorX::Zero(x.size());
-  energy.add_gradient_at({other, x - other}, gradient, workspace);
-  EXPECT_LE((gradient - gradient_of(energy, x)).norm(), 1e-13 * gradient.norm());
-  EXPECT_NEAR(energy.value_at({other, x - other}, workspace), energy.value(x, workspace), 1e-13);
+  expect_increments(energy, other, x);
   const VectorX v = moved(cells, 9, 0);
   VectorX product = VectorX::Zero(x.size());
   energy.add_product(x, v, product);
@@ -149,12 +152,48 @@ void expect_coupling(const Mesh<Dim>& mesh, bool is_rigid) {
 
 TEST(CouplingEnergy, HasItsDerivatives) {
   for (const bool is_rigid : {false, true}) {
-    expect_coupling(block_with_sides<2>(), is_rigid);
-    expect_coupling(block_with_sides<3>(), is_rigid);
+    expect_coupling(block_with_sides<2>(), is_rigid, {false, false, true});
+    for (int held = 0; held < 8; ++held)
+      expect_coupling(block_with_sides<3>(), is_rigid, {(held & 1) != 0, (held & 2) != 0, (held & 4) != 0});
     Mesh<2> curved = block_with_sides<2>();
     curved.set_curved_edges(curved.edges());
-    expect_coupling(curved, is_rigid);
+    expect_coupling(curved, is_rigid, {false, false, true});
   }
+}
+
+/// The energy that holds turns is least where they are, and grows up to half a turn about any held axis.
+template <int Dim>
+void expect_one_least(const Mesh<Dim>& mesh, const std::array<bool, 3>& rotation) {
+  const CellSet<Dim> cells = whole_mesh(mesh, {});
+  const SurfaceMean<Dim> mean(cells, std::vector<int>{3});
+  const CoupledPoint<Dim> point(mean, Vec<3>::Zero());
+  HeldPoint<Dim> held{.rotation = rotation};
+  held.turned = Eigen::AngleAxisd(2, Dim == 2 ? Vec<3>(0, 0, 1) : Vec<3>(0.6, 0, 0.8)).toRotationMatrix();
+  const CouplingEnergy<Dim> energy(point, {}, held, 1);
+  Workspace workspace;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!rotation[axis]) continue;
+    double before = -1;
+    for (const double turn : {0.0, 0.3, 1.2, 1.8, 2.5, 3.1}) {
+      const Mat<3> R = held.turned * Eigen::AngleAxisd(turn, Vec<3>(Vec<3>::Unit(axis))).toRotationMatrix();
+      VectorX x = itr::rest_positions<Dim>(cells);
+      for (Eigen::Index i = 0; i < x.size(); i += Dim)
+        x.segment<Dim>(i) = (R.topLeftCorner<Dim, Dim>() * x.segment<Dim>(i)).eval();
+      const double value = energy.value(x, workspace);
+      if (turn == 0)
+        EXPECT_LE(value, 1e-28);
+      else
+        EXPECT_GT(value, before + 1e-4);
+      before = value;
+    }
+  }
+}
+
+TEST(CouplingEnergy, HasOneLeastWhereTurnsAreHeld) {
+  expect_one_least(block_with_sides<2>(), {false, false, true});
+  for (const std::array<bool, 3> held :
+       {std::array{true, true, true}, {false, true, true}, {true, false, true}, {true, true, false}})
+    expect_one_least(block_with_sides<3>(), held);
 }
 
 template <int Dim>
@@ -166,12 +205,8 @@ void expect_springs(const Mesh<Dim>& mesh) {
   const VectorX rest = itr::rest_positions<Dim>(cells), x = moved(cells, 3, 0.4), other = moved(cells, 6, 0.1);
   expect_derivatives(energy, x, 1e-4, 1e-8);
   expect_psd(energy, x);
+  expect_increments(energy, other, x);
   Workspace workspace;
-  VectorX gradient = VectorX::Zero(x.size());
-  energy.add_gradient_at({other, x - other}, gradient, workspace);
-  EXPECT_LE((gradient - gradient_of(energy, x)).norm(), 1e-13 * gradient.norm());
-  EXPECT_NEAR(energy.value_at({other, x - other}, workspace) - energy.value_at({other, 0 * x}, workspace),
-              energy.value(x, workspace) - energy.value(other, workspace), 1e-13);
   VectorX shifted = rest;
   for (Eigen::Index i = 0; i < rest.size(); i += Dim) shifted[i] += 0.3;
   double area = 0;

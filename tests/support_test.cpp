@@ -149,6 +149,11 @@ TEST_F(SupportSceneTest, HeldPointTurnsABody) {
   EXPECT_LE((motion.u - Vec<2>(0.5, 0)).norm(), 1e-8);
   const VectorX& x = simulation.state().history.x[0];
   EXPECT_NEAR((x.segment<2>(0) - x.segment<2>(2 * 4)).norm(), 2, 1e-6);
+  // By more than a quarter of a turn at once, too.
+  Simulation<2> at_once =
+      simulation_of(beam(2, 1, 4, 2, {{"couplings", {{{"id", 3}, {"held", {"x", "y", "rz"}}, {"turn", 120}}}}}));
+  advance(at_once);
+  EXPECT_NEAR(motion_of(at_once).turn, 120 * std::numbers::pi / 180, 1e-8);
 }
 
 /// A stiff block on springs along y only, with a mass on it: sinks by m g / k, swings by the period of both masses.

@@ -62,7 +62,9 @@ TrialScene scene_of_all_terms() {
       std::dynamic_pointer_cast<const ViscousField<2>>(
           ViscousStep<2>(std::dynamic_pointer_cast<const ViscousField<2>>(state), viscous, 0.1).end(start, x, 0.1).state),
       viscous, 0.1);
-  scene.context.follower = [](const VectorX& x) { return std::make_shared<LinearizedForces<2>>(VectorX(), x, 1); };
+  scene.context.follower = [](const VectorX& x) {
+    return std::vector<std::shared_ptr<const Energy>>{std::make_shared<LinearizedForces<2>>(VectorX(), x, 1)};
+  };
   const auto dofs = scene.fields.x.size() + 2 * static_cast<Eigen::Index>(scene.context.obstacles.rest.size());
   scene.context.tie = std::make_shared<LinearizedForces<2>>(VectorX(), VectorX::Zero(dofs), 1);
   return scene;
@@ -185,7 +187,7 @@ TEST(Terms, ThatPredictionsDoNotKnowArePredictedToGainAnything) {
       [](auto& c) {
         c.host.push_back(push({1, 0}));
       },
-      [](auto& c) { c.follower = [](const VectorX&) { return std::shared_ptr<const Energy>(); }; },
+      [](auto& c) { c.follower = [](const VectorX&) { return std::vector<std::shared_ptr<const Energy>>(); }; },
       [](auto& c) { c.loads.pressures.emplace_back(1, [](const Vec<2>&) { return 1.0; }); },
       [](auto& c) { c.damping.push_back({}); }};
   const auto look = [](const TrialScene& scene) {

@@ -17,7 +17,7 @@ namespace itr {
 
 namespace {
 
-constexpr double kRoundOff = 1e-13;  ///< of the surface's size: less is not open
+constexpr double kRoundOff = 1e-13;  ///< of sizes and positions: less is not open, and no arm
 
 /// A block of the plane in a matrix of space.
 template <int Dim>
@@ -25,6 +25,29 @@ Mat<3> in_space(const Mat<Dim>& block) {
   Mat<3> all = Mat<3>::Zero();
   all.topLeftCorner<Dim, Dim>() = block;
   return all;
+}
+
+/// By a held turn, the matrix of its condition <matrix, Q^T R> = 0 for the rotation R, held at Q. An axis that is free to
+/// turn about stays where Q has it, or in the plane of that and the held axis.
+Mat<3> condition_of(const std::array<bool, 3>& held, int axis) {
+  const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+  Mat<3> matrix = Mat<3>::Zero();
+  if (!held[next])
+    matrix(last, next) = 1;
+  else if (!held[last])
+    matrix(next, last) = -1;
+  else
+    matrix(last, next) = 0.5, matrix(next, last) = -0.5;
+  return matrix;
+}
+
+/// By axis, the part of k/2 |(R - Q) axis|^2 in the energy that holds R at Q: beside the condition it is k/2 of the squares
+/// of these, and largest half a turn away, where squares are least again. One held turn alone has none.
+Vec<3> parts_of_axes(const std::array<bool, 3>& held) {
+  const auto count = std::ranges::count(held, true);
+  Vec<3> parts = Vec<3>::Zero();
+  for (int c = 0; c < 3; ++c) parts[c] = count == 3 ? 0.5 : count == 2 && !held[c] ? 1 : 0;
+  return parts;
 }
 
 /// The means of products with X - centroid.
@@ -84,6 +107,7 @@ MatrixX SurfaceMean<Dim>::values(ConstVectorView field) const {
 template <int Dim>
 CoupledPoint<Dim>::CoupledPoint(const SurfaceMean<Dim>& mean, const Vec<3>& point) : mean_(mean) {
   arm_.head<Dim>() = point.head<Dim>() - mean.centroid;
+  if (arm_.norm() <= kRoundOff * (point.norm() + std::sqrt(mean.moments.trace()))) arm_.setZero();
 }
 
 template <int Dim>
@@ -119,6 +143,7 @@ CouplingEnergy<Dim>::CouplingEnergy(const CoupledPoint<Dim>& point, const PointT
     : point_(point), mean_(point.mean()), terms_(terms), held_(std::move(held)), scale_(scale) {
   multiplier_.nodes = MatrixX::Zero(Dim, held_.is_rigid ? mean_.rest.cols() : 0);
   arms_ = mean_.rest.colwise() - mean_.centroid;
+  if (Dim == 2) held_.rotation.fill(held_.rotation[2]);  // surfaces turn about z only
 }
 
 template <int Dim>
@@ -126,11 +151,11 @@ typename CouplingEnergy<Dim>::Open CouplingEnergy<Dim>::open_at(const MatrixX& U
                                                                 const Mat<3>& R) const {
   Open open;
   const Vec<Dim> u = point_.displacement(means, R) - held_.displacement;
-  const Vec<3> turn = axial(held_.turned.transpose() * R) / 2;
+  const Mat<3> seen = held_.turned.transpose() * R;
   for (int c = 0; c < Dim; ++c)
     if (held_.position[c]) open.position[c] = u[c];
   for (int c = 0; c < 3; ++c)
-    if (held_.rotation[c]) open.rotation[c] = turn[c];
+    if (held_.rotation[c]) open.rotation[c] = condition_of(held_.rotation, c).cwiseProduct(seen).sum();
   if (held_.is_rigid) {
     const Mat<Dim> turned = (R - Mat<3>::Identity()).topLeftCorner<Dim, Dim>();
     open.nodes = (U - turned * arms_).colwise() - Vec<Dim>(means.col(0));
@@ -148,7 +173,10 @@ double CouplingEnergy<Dim>::value_of(const MatrixX& U) const {
     sum -= terms_.moment * std::remainder(std::atan2(R(1, 0), R(0, 0)) - terms_.turn, 2 * std::numbers::pi);
   const Open open = open_at(U, means, R);
   sum += multiplier_.position.dot(open.position) + held_.stiffness / 2 * open.position.squaredNorm();
-  sum += multiplier_.rotation.dot(open.rotation) + rotation_stiffness() / 2 * open.rotation.squaredNorm();
+  const Vec<3> axes = parts_of_axes(held_.rotation);
+  const Vec<3> off_axes = (R - held_.turned).colwise().squaredNorm();
+  sum += multiplier_.rotation.dot(open.rotation) +
+         rotation_stiffness() / 2 * (axes.isZero(0) ? open.rotation.squaredNorm() : axes.dot(off_axes));
   if (held_.is_rigid)
     sum += (multiplier_.nodes.cwiseProduct(open.nodes).sum() + held_.stiffness / 2 * open.nodes.squaredNorm()) /
            static_cast<double>(U.cols());
@@ -165,8 +193,13 @@ typename CouplingEnergy<Dim>::Forces CouplingEnergy<Dim>::forces_at(const Matrix
   forces.by_position = -terms_.force + terms_.stiffness * off + multiplier_.position + held_.stiffness * open.position;
   Vec<3> in_all = Vec<3>::Zero();
   in_all.head<Dim>() = forces.by_position;
-  const Vec<3> couple = (multiplier_.rotation + rotation_stiffness() * open.rotation) / 2;
-  forces.by_rotation = in_all * point_.arm().transpose() - terms_.couple + held_.turned * skew(couple);
+  const Vec<3> axes = parts_of_axes(held_.rotation);
+  forces.by_rotation = in_all * point_.arm().transpose() - terms_.couple +
+                       rotation_stiffness() * (rotation.R() - held_.turned) * axes.asDiagonal();
+  for (int c = 0; c < 3; ++c) {
+    const double couple = multiplier_.rotation[c] + (axes.isZero(0) ? rotation_stiffness() * open.rotation[c] : 0);
+    forces.by_rotation += couple * held_.turned * condition_of(held_.rotation, c);
+  }
   forces.by_means.col(0) = forces.by_position;
   if (held_.is_rigid) {
     forces.by_nodes = (multiplier_.nodes + held_.stiffness * open.nodes) / static_cast<double>(U.cols());
@@ -210,7 +243,8 @@ void CouplingEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
   std::array<Mat<3>, kMeans> H;
   std::array<Vec<3>, kMeans> w;
   Eigen::Matrix<double, Dim, kMeans> du;
-  Eigen::Matrix<double, 3, kMeans> turn;
+  Eigen::Matrix<double, 9, kMeans> turn = Eigen::Matrix<double, 9, kMeans>::Zero();  // what is held of turns
+  const Vec<3> axes = parts_of_axes(held_.rotation);
   std::array<Mat<Dim>, kMeans> dR;
   for (int j = 0; j < kMeans; ++j) {
     H[j].setZero();
@@ -220,12 +254,12 @@ void CouplingEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
     dR[j] = change.topLeftCorner<Dim, Dim>();
     du.col(j) = (change * point_.arm()).template head<Dim>();
     if (j < Dim) du(j, j) += 1;
-    turn.col(j) = axial(seen * skew(w[j])) / 2;
+    if (!axes.isZero(0)) turn.col(j) = Mat<3>(change * axes.cwiseSqrt().asDiagonal()).reshaped();
+    for (int c = 0; axes.isZero(0) && c < 3; ++c)
+      if (held_.rotation[c]) turn(c, j) = condition_of(held_.rotation, c).cwiseProduct(seen * skew(w[j])).sum();
   }
   Mat<Dim> K = terms_.stiffness;
   for (int c = 0; c < Dim; ++c) K(c, c) += held_.position[c] ? held_.stiffness : 0;
-  for (int c = 0; c < 3; ++c)
-    if (!held_.rotation[c]) turn.row(c).setZero();
   MatrixX by_means = du.transpose() * K * du + rotation_stiffness() * turn.transpose() * turn;
   MatrixX curved(kMeans, kMeans);
   for (int j = 0; j < kMeans; ++j)
@@ -240,22 +274,19 @@ void CouplingEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hess
   MatrixX to_means = MatrixX::Zero(Dim * n, kMeans);  // transposed
   for (Eigen::Index i = 0; i < n; ++i)
     for (int k = 0; k <= Dim; ++k) to_means.block<Dim, Dim>(Dim * i, Dim * k) = mean_.weights(i, k) * Mat<Dim>::Identity();
-  MatrixX block;
+  MatrixX block = to_means * by_means * to_means.transpose();
   if (held_.is_rigid) {
+    const double stiffness = held_.stiffness / static_cast<double>(n);
     MatrixX frame(Dim * n, kMeans);  // motions of nodes with the frame
     for (int j = 0; j < kMeans; ++j)
       for (Eigen::Index i = 0; i < n; ++i) {
         frame.block<Dim, 1>(Dim * i, j) = dR[j] * arms_.col(i);
         if (j < Dim) frame(Dim * i + j, j) += 1;
       }
-    const MatrixX with_frame = to_means * frame.transpose();
-    block = to_means * (frame.transpose() * frame) * to_means.transpose() - with_frame - with_frame.transpose();
-    block.diagonal().array() += 1;
-    block *= held_.stiffness / static_cast<double>(n);
-  } else {
-    block = MatrixX::Zero(Dim * n, Dim * n);
+    const MatrixX with_frame = to_means * (frame - to_means * (frame.transpose() * frame) / 2).transpose();
+    block -= stiffness * (with_frame + with_frame.transpose());
+    block.diagonal().array() += stiffness;
   }
-  block += to_means * by_means * to_means.transpose();
   block *= scale_;
   sink.add<Dim>(mean_.nodes, block.data());
 }

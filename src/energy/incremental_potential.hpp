@@ -45,8 +45,7 @@ class IncrementalPotential {
     std::shared_ptr<FrictionEnergy<Dim>> friction_of_surface;  ///< the same, over the surface's vertices
     std::shared_ptr<const Energy> adhesive_friction;
     std::shared_ptr<PressureEnergy<Dim>> pressure;
-    std::vector<std::shared_ptr<const Energy>> damping, contact_damping;
-    std::shared_ptr<const Energy> follower;
+    std::vector<std::shared_ptr<const Energy>> damping, contact_damping, follower;
   };
   /// Makes the terms that are lagged at x.
   Lagged lag(ConstVectorView x, Workspace& workspace) const;
@@ -66,7 +65,7 @@ class IncrementalPotential {
     visit(TermKind::viscous, viscous_);
     visit(TermKind::loads, loads_);
     for (const auto& term : host_) visit(TermKind::host, term);
-    visit(TermKind::follower, lagged.follower);
+    for (const auto& term : lagged.follower) visit(TermKind::follower, term);
     visit(TermKind::contact, contact_of_cells_);
     visit(TermKind::adhesion, adhesion_of_cells_);
     visit(TermKind::friction, lagged.friction);

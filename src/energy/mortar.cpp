@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "energy/load_points.hpp"
 #include "fem/locator.hpp"
 #include "fem/quadratic.hpp"
 #include "fem/quadrature.hpp"
@@ -27,14 +28,6 @@ constexpr double kLeastOverlap = 0.25;  ///< of a function's facets, for a condi
 
 template <int Dim>
 using Corners = std::array<Vec<Dim>, Dim>;
-
-template <int Dim>
-double measure_of(const Corners<Dim>& p) {
-  if constexpr (Dim == 2)
-    return (p[1] - p[0]).norm();
-  else
-    return (p[1] - p[0]).cross(p[2] - p[0]).norm() / 2;
-}
 
 template <int Dim>
 double longest_edge(const Corners<Dim>& p) {
@@ -88,7 +81,7 @@ std::vector<Corners<3>> overlap_of(const Corners<3>& own, const Corners<3>& othe
   std::vector<Corners<3>> triangles;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i)
     triangles.push_back({in_space(polygon[0]), in_space(polygon[i]), in_space(polygon[i + 1])});
-  std::erase_if(triangles, [&](const auto& t) { return measure_of<3>(t) < kSliver * measure_of<3>(own); });
+  std::erase_if(triangles, [&](const auto& t) { return facet_area(t) < kSliver * facet_area(own); });
   return triangles;
 }
 
@@ -124,7 +117,7 @@ class Sides {
       side.facets.push_back(facet.vertices);
       side.corners.push_back(corners);
       side.elements.push_back(element_of(facet.vertices));
-      side.area += measure_of<Dim>(corners);
+      side.area += facet_area(corners);
     }
     return side;
   }
@@ -179,7 +172,7 @@ std::vector<Piece<Dim>> pieces_of(const Side<Dim>& own, const Side<Dim>& other) 
 template <int Dim>
 double covered_by(const std::vector<Piece<Dim>>& pieces, const Side<Dim>& side) {
   double area = 0;
-  for (const auto& piece : pieces) area += measure_of<Dim>(piece.corners);
+  for (const auto& piece : pieces) area += facet_area(piece.corners);
   return side.area > 0 ? area / side.area : 0;
 }
 
@@ -215,9 +208,9 @@ class MortarBuilder {
     std::map<int, double> all, covered;
     const Side<Dim>& own = overlap.own;
     for (std::size_t f = 0; f < own.facets.size(); ++f)
-      for (const int v : own.facets[f]) all[v] += measure_of<Dim>(own.corners[f]);
+      for (const int v : own.facets[f]) all[v] += facet_area(own.corners[f]);
     for (const auto& piece : overlap.pieces)
-      for (const int v : own.facets[piece.own]) covered[v] += measure_of<Dim>(piece.corners);
+      for (const int v : own.facets[piece.own]) covered[v] += facet_area(piece.corners);
     for (const auto& [v, area] : all)
       if (covered[v] < kLeastOverlap * area) hardly_overlap_.insert(v);
   }
@@ -259,7 +252,7 @@ class MortarBuilder {
   /// Adds the integrals over a piece, by function of its facet.
   void add(const Piece<Dim>& piece) {
     const Element &own = *overlap_.own.elements[piece.own], &other = *overlap_.other.elements[piece.other];
-    const double area = measure_of<Dim>(piece.corners);
+    const double area = facet_area(piece.corners);
     const auto& facet = overlap_.own.facets[piece.own];
     for (const auto& point : quadrature<Dim - 1>(degree_with_turn(3, cells_.axisymmetric))) {
       Vec<Dim> X = Vec<Dim>::Zero();

@@ -36,10 +36,8 @@ struct Coupling {
   double mass = 0;                           ///< at it [kg]
   Mat<3> stiffness = Mat<3>::Zero();         ///< of a spring to where it is at rest [N/m]
 
-  bool is_held() const {
-    const auto any = [](const std::array<bool, 3>& held) { return held[0] || held[1] || held[2]; };
-    return is_rigid || any(held_position) || any(held_rotation);
-  }
+  bool is_held() const { return held_position != std::array<bool, 3>{} || held_rotation != std::array<bool, 3>{}; }
+  bool has_conditions() const { return is_rigid || is_held(); }
 };
 
 /// The entry of springs, which makes their energy on any cells.

@@ -39,8 +39,8 @@ struct PotentialTerms {
   double velocity_rate = 1;             ///< of VelocityRule [1/s]
   std::vector<TermFactory<Dim>> host;   ///< what the program adds
   double t = 0;                         ///< at the end of the step, for them [s]
-  /// Its forces of positions, linearised at those of the cells' vertices; empty: none. On the whole mesh only.
-  std::function<std::shared_ptr<const Energy>(const VectorX& x)> follower;
+  /// Forces of positions, lagged or linearised at those of the cells' vertices; empty: none. On the whole mesh only.
+  std::function<std::vector<std::shared_ptr<const Energy>>(const VectorX& x)> follower;
   std::shared_ptr<const Energy> tie{};  ///< on the whole mesh only: in patches its forces are tractions; null: none
 };
 

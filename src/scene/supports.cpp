@@ -6,13 +6,13 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <numbers>
 #include <set>
 #include <string>
 
+#include "mesh/facet_measure.hpp"
 #include "mesh/facet_tags.hpp"
 #include "mesh/turn.hpp"
 #include "rigid.hpp"
@@ -51,15 +51,9 @@ std::pair<double, Vec<Dim>> area_of(const Mesh<Dim>& mesh, const std::vector<int
   Vec<Dim> moment = Vec<Dim>::Zero();
   for (const FacetId f : mesh.live_facets()) {
     if (std::ranges::find(tags, mesh.facet_tag(f)) == tags.end()) continue;
-    const auto& facet = mesh.facet(f);
     Vec<Dim> middle = Vec<Dim>::Zero();
-    for (const VertexId v : facet) middle += mesh.rest(v) / Dim;
-    const Vec<Dim> edge = mesh.rest(facet[1]) - mesh.rest(facet[0]);
-    double part = turn_at(mesh, middle);
-    if constexpr (Dim == 2)
-      part *= edge.norm();
-    else
-      part *= edge.cross(mesh.rest(facet[2]) - mesh.rest(facet[0])).norm() / 2;
+    for (const VertexId v : mesh.facet(f)) middle += mesh.rest(v) / Dim;
+    const double part = facet_measure(mesh, f) * turn_at(mesh, middle);
     area += part;
     moment += part * middle;
   }

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -22,38 +23,6 @@ Mat<3> rotation_by(const Vec<3>& turn) {
   const double angle = turn.norm();
   return angle == 0 ? Mat<3>(Mat<3>::Identity()) : Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
 }
-
-/// A sum that reads increments where its terms do.
-template <int Dim>
-class PointSum final : public Energy, public IncrementalTerm {
- public:
-  std::shared_ptr<const Energy> others;
-  std::vector<std::shared_ptr<const CouplingEnergy<Dim>>> terms;
-
-  std::string_view name() const override { return "coupled points"; }
-  double value(ConstVectorView x, Workspace& workspace) const override {
-    double sum = others ? others->value(x, workspace) : 0;
-    for (const auto& term : terms) sum += term->value(x, workspace);
-    return sum;
-  }
-  void add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const override {
-    if (others) others->add_gradient(x, gradient, workspace);
-    for (const auto& term : terms) term->add_gradient(x, gradient, workspace);
-  }
-  void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override {
-    if (others) others->add_hessian(x, psd, sink, workspace);
-    for (const auto& term : terms) term->add_hessian(x, psd, sink, workspace);
-  }
-  double value_at(const Increment& at, Workspace& workspace) const override {
-    double sum = others ? others->value(VectorX(at.base + at.d), workspace) : 0;
-    for (const auto& term : terms) sum += term->value_at(at, workspace);
-    return sum;
-  }
-  void add_gradient_at(const Increment& at, VectorView gradient, Workspace& workspace) const override {
-    if (others) others->add_gradient(VectorX(at.base + at.d), gradient, workspace);
-    for (const auto& term : terms) term->add_gradient_at(at, gradient, workspace);
-  }
-};
 
 }  // namespace
 
@@ -85,11 +54,19 @@ CoupledPoints<Dim>::CoupledPoints(const StepSetup<Dim>& setup, const PotentialTe
   }
 }
 
+/// Those that there are of one point.
+template <int Dim>
+auto CoupledPoints<Dim>::terms_of(std::size_t i, const VectorX& x) const -> std::vector<Term> {
+  std::vector<Term> terms{supports_[i], masses_[i], load_of(surfaces_[i], x)};
+  std::erase(terms, nullptr);
+  return terms;
+}
+
 /// Conditions on a point, and its spring. By the trapezoidal rule half of a gap is left, as StepProblem::add_ties says.
 template <int Dim>
 auto CoupledPoints<Dim>::support_of(const CoupledSurface<Dim>& surface, const History& history) const -> Term {
   const Coupling& coupling = *surface.coupling;
-  if (!coupling.is_held() && coupling.stiffness.isZero(0)) return nullptr;
+  if (!coupling.has_conditions() && coupling.stiffness.isZero(0)) return nullptr;
   const CoupledPoint<Dim> point = surface.point();
   PointTerms<Dim> parts;
   parts.stiffness = coupling.stiffness.topLeftCorner<Dim, Dim>();
@@ -161,32 +138,27 @@ auto CoupledPoints<Dim>::load_of(const CoupledSurface<Dim>& surface, const Vecto
 }
 
 template <int Dim>
-std::shared_ptr<const Energy> CoupledPoints<Dim>::sum(const VectorX& x, std::shared_ptr<const Energy> others) const {
-  auto sum = std::make_shared<PointSum<Dim>>();
-  sum->others = std::move(others);
-  for (std::size_t i = 0; i < surfaces_.size(); ++i)
-    for (auto& term : terms_of(i, x))
-      if (term) sum->terms.push_back(std::move(term));
-  return sum;
+std::vector<std::shared_ptr<const Energy>> CoupledPoints<Dim>::terms(const VectorX& x) const {
+  std::vector<std::shared_ptr<const Energy>> terms;
+  for (std::size_t i = 0; i < surfaces_.size(); ++i) std::ranges::copy(terms_of(i, x), std::back_inserter(terms));
+  return terms;
 }
 
 template <int Dim>
 std::vector<Constraint*> CoupledPoints<Dim>::constraints() const {
   std::vector<Constraint*> found;
   for (std::size_t i = 0; i < surfaces_.size(); ++i)
-    if (surfaces_[i].coupling->is_held()) found.push_back(supports_[i].get());
+    if (surfaces_[i].coupling->has_conditions()) found.push_back(supports_[i].get());
   return found;
 }
 
 template <int Dim>
-std::vector<std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>& X)>>> CoupledPoints<Dim>::tractions(
-    const VectorX& x) const {
-  std::vector<std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>& X)>>> tractions;
+std::vector<TractionOfTie<Dim>> CoupledPoints<Dim>::tractions(const VectorX& x) const {
+  std::vector<TractionOfTie<Dim>> tractions;
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     const SurfaceMean<Dim>& mean = surfaces_[i].mean;
     typename CouplingEnergy<Dim>::Means gradient = CouplingEnergy<Dim>::Means::Zero();
-    for (const auto& term : terms_of(i, x))
-      if (term) gradient += term->gradient_of_means(x);
+    for (const auto& term : terms_of(i, x)) gradient += term->gradient_of_means(x);
     gradient /= -terms_.scaling * mean.area;
     for (const int tag : surfaces_[i].coupling->surfaces)
       tractions.emplace_back(tag, [gradient, centroid = mean.centroid](const RestPoint<Dim>& X) {

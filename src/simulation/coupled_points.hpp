@@ -7,6 +7,7 @@
 
 #include "energy/coupling.hpp"
 #include "energy/terms.hpp"
+#include "energy/tie.hpp"
 #include "itr/setup.hpp"
 #include "time/integrator.hpp"
 
@@ -33,11 +34,11 @@ class CoupledPoints {
   CoupledPoints(const StepSetup<Dim>& setup, const PotentialTerms<Dim>& terms,
                 const std::vector<CoupledSurface<Dim>>& surfaces, const History& history);
   bool empty() const { return surfaces_.empty(); }
-  /// Their sum, with loads that are lagged at x and with `others`, if not null.
-  std::shared_ptr<const Energy> sum(const VectorX& x, std::shared_ptr<const Energy> others) const;
+  /// With loads that are lagged at x.
+  std::vector<std::shared_ptr<const Energy>> terms(const VectorX& x) const;
   std::vector<Constraint*> constraints() const;
   /// By tag of facets, the tractions by which points act on their surfaces where the bodies are at x [N/m^(Dim-1)].
-  std::vector<std::pair<int, std::function<Vec<Dim>(const RestPoint<Dim>& X)>>> tractions(const VectorX& x) const;
+  std::vector<TractionOfTie<Dim>> tractions(const VectorX& x) const;
   /// Adds the product of their masses, where the bodies are at x, with velocities of nodes.
   void add_mass_product(const VectorX& x, const VectorX& v, VectorX& product) const;
 
@@ -46,9 +47,7 @@ class CoupledPoints {
   Term support_of(const CoupledSurface<Dim>& surface, const History& history) const;
   Term mass_of(const CoupledSurface<Dim>& surface, const History& history) const;
   Term load_of(const CoupledSurface<Dim>& surface, const VectorX& x) const;
-  std::vector<Term> terms_of(std::size_t i, const VectorX& x) const {
-    return {supports_[i], masses_[i], load_of(surfaces_[i], x)};
-  }
+  std::vector<Term> terms_of(std::size_t i, const VectorX& x) const;
 
   const StepSetup<Dim>& setup_;
   const PotentialTerms<Dim>& terms_;

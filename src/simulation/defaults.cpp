@@ -12,6 +12,7 @@
 #include "energy/support.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
+#include "mesh/facet_measure.hpp"
 #include "mesh/rest_box.hpp"
 #include "mesh/turn.hpp"
 #include "simulation/closed_faces.hpp"

@@ -442,7 +442,9 @@ class LaggedSolve {
     return rounds;
   }
   /// Loads that depend on the positions and have no potential.
-  bool has_lagged_loads() const { return lagged_.follower || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_)); }
+  bool has_lagged_loads() const {
+    return !lagged_.follower.empty() || (lagged_.pressure && lagged_.pressure->is_lagged(dofs_));
+  }
   /// Forces on unknowns at x of the terms of which `is_asked(traits)` holds, scaled.
   template <typename F>
   VectorX forces_of(const VectorX& x, const Lagged& lagged, const F& is_asked) {

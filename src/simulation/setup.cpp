@@ -309,7 +309,8 @@ void check_supports(const Setup<Dim>& setup) {
     for (const int tag : coupling.surfaces)
       if (const auto [entry, is_free] = taken.try_emplace(tag, "that another coupling has"); !is_free)
         refuse(place + "/id", "a surface " + entry->second, "a surface that nothing else moves");
-    if (!coupling.is_held() && !coupling.force && !coupling.moment && coupling.mass == 0 && coupling.stiffness.isZero(0))
+    if (!coupling.has_conditions() && !coupling.force && !coupling.moment && coupling.mass == 0 &&
+        coupling.stiffness.isZero(0))
       refuse(place, "a point on which nothing acts", "force, moment, mass, stiffness, held or \"kind\": \"rigid\"");
   }
   check_nodes_of_couplings(setup);

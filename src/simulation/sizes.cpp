@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mesh/cell_of_facet.hpp"
+#include "mesh/facet_measure.hpp"
 
 namespace itr {
 
@@ -22,17 +23,6 @@ EdgeLengths edge_lengths(const Mesh<Dim>& mesh) {
     lengths.longest = std::max(lengths.longest, length);
   }
   return lengths;
-}
-
-template <int Dim>
-double facet_measure(const Mesh<Dim>& mesh, FacetId f) {
-  const auto& facet = mesh.facet(f);
-  const Vec<Dim> a = mesh.rest(facet[1]) - mesh.rest(facet[0]);
-  if constexpr (Dim == 2) {
-    return a.norm();
-  } else {
-    return a.cross(Vec<Dim>(mesh.rest(facet[2]) - mesh.rest(facet[0]))).norm() / 2;
-  }
 }
 
 template <int Dim>
@@ -111,8 +101,6 @@ template std::map<int, double> fractions_of_rounds(const Mesh<2>&);
 template std::map<int, double> fractions_of_rounds(const Mesh<3>&);
 template EdgeLengths edge_lengths(const Mesh<2>&);
 template EdgeLengths edge_lengths(const Mesh<3>&);
-template double facet_measure(const Mesh<2>&, FacetId);
-template double facet_measure(const Mesh<3>&, FacetId);
 template std::map<int, BodySize> body_sizes(const Mesh<2>&);
 template std::map<int, BodySize> body_sizes(const Mesh<3>&);
 

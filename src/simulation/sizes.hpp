@@ -25,10 +25,6 @@ struct EdgeLengths {
 template <int Dim>
 EdgeLengths edge_lengths(const Mesh<Dim>& mesh);
 
-/// Length or area of a boundary facet at rest [m], [m^2].
-template <int Dim>
-double facet_measure(const Mesh<Dim>& mesh, FacetId f);
-
 /// By id, at rest.
 template <int Dim>
 std::map<int, BodySize> body_sizes(const Mesh<Dim>& mesh);

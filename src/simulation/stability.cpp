@@ -12,6 +12,7 @@
 #include "geometry/bvh.hpp"
 #include "geometry/predicates.hpp"
 #include "mesh/cell_of_facet.hpp"
+#include "mesh/facet_measure.hpp"
 #include "sizes.hpp"
 
 namespace itr {

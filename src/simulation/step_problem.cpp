@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <span>
 #include <utility>
@@ -118,22 +119,15 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
       cache_(cache) {
   if (terms_.has_inertia)
     potential_.inertia()->set_predicted_increment(TimeIntegrator(setup.time).predicted_increment(history));
-  if (setup.follower.forces)
-    terms_.follower = [this, &mesh, t](const VectorX& x) {
-      return lag_follower(setup_.follower, mesh, x, t, terms_.scaling);
-    };
-  if (std::vector<int> loaded = loaded_rigid_bodies(); !loaded.empty())
-    terms_.follower = [this, t, loaded, program = terms_.follower](const VectorX& x) {
-      auto sum = std::make_shared<EnergySum>();
-      if (program) sum->add(program(x));
-      for (const int body : loaded) sum->add(rigid_load(body, x, t));
-      return sum;
-    };
   coupled_ = std::make_unique<const CoupledPoints<Dim>>(setup, terms_, scope_->coupled, history);
-  for (Constraint* constraint : coupled_->constraints()) constraints_.push_back(constraint);
-  if (!coupled_->empty())
-    terms_.follower = [this, others = terms_.follower](const VectorX& x) {
-      return coupled_->sum(x, others ? others(x) : nullptr);
+  constraints_ = coupled_->constraints();
+  if (std::vector<int> loaded = loaded_rigid_bodies(); setup.follower.forces || !loaded.empty() || !coupled_->empty())
+    terms_.follower = [this, &mesh, t, loaded](const VectorX& x) {
+      std::vector<std::shared_ptr<const Energy>> terms;
+      if (setup_.follower.forces) terms.push_back(lag_follower(setup_.follower, mesh, x, t, terms_.scaling));
+      for (const int body : loaded) terms.push_back(rigid_load(body, x, t));
+      std::ranges::copy(coupled_->terms(x), std::back_inserter(terms));
+      return terms;
     };
   if (setup.contact.enabled) {
     if (!setup.contact.adaptive_stiffness) {

@@ -21,6 +21,7 @@
 #include "itr/setup.hpp"
 #include "long_steps.hpp"
 #include "mesh/cell_of_facet.hpp"
+#include "mesh/facet_measure.hpp"
 #include "mesh_figures.hpp"
 #include "resolution.hpp"
 #include "simulation/barrier_stiffness.hpp"
@@ -226,6 +227,14 @@ std::pair<std::set<int>, int> find_loose_parts(const Setup<Dim>& setup) {
   for (const auto& mortar : mortars_of(setup, mesh, cells))
     for (const auto& row : mortar.rows)
       for (const int node : row.nodes) edges.push_back({row.nodes.front(), node});
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads)) {
+    VertexId first = kNone;  // rigid surfaces are one part
+    for (const FacetId f : mesh.live_facets())
+      if (coupling->is_rigid && std::ranges::find(coupling->surfaces, mesh.facet_tag(f)) != coupling->surfaces.end()) {
+        if (first == kNone) first = mesh.facet(f)[0];
+        edges.push_back({first, mesh.facet(f)[0]});
+      }
+  }
   const std::vector<int> part = connected_parts<2>(mesh.node_slots(), edges);
   std::set<int> fixed, loose, bodies;
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
