@@ -183,7 +183,7 @@ Nearest<Dim> Solids<Dim>::find_nearest(std::size_t i, std::size_t point, std::si
   Nearest<Dim> nearest;
   double least = std::numeric_limits<double>::infinity(), best = -1;
   std::vector<int> hits;
-  // What is found beyond the reach of a query may not be the nearest.
+  // A query may have left out facets nearer than one that it finds beyond its reach.
   for (double reach = 0, next = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach); next *= 4) {
     reach = next;
     hits.clear();

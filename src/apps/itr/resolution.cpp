@@ -60,7 +60,7 @@ void add_eigenstrains(const Setup<Dim>& setup, double t, Actions& actions) {
   }
 }
 
-/// What is held at t, and its motion since `before`.
+/// Adds what is held at t, and its motion since `before`.
 template <int Dim>
 void add_moves(const Setup<Dim>& setup, double before, double t, Actions& actions) {
   const Mesh<Dim>& mesh = setup.mesh;
