@@ -48,6 +48,9 @@ class Assemblies(unittest.TestCase):
             self.assertEqual(path.read_text(), (self.folder / path.relative_to(HERE)).read_text(), path)
             self.assertLess(path.stat().st_size, 100_000, path)
 
+    def test_page_has_the_stored_table(self):
+        self.assertIn(study.table(), (HERE / "README.md").read_text())
+
     def test_each_is_accepted_and_has_no_key_of_method(self):
         for name in make.SCENES:
             with self.subTest(name):

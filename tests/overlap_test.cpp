@@ -185,6 +185,23 @@ TEST(Overlap, TouchingBodiesBeginApart) {
   }
 }
 
+/// Bodies that lie askew: boxes around facets then are nearer than these.
+TEST(Overlap, DepthsAreThoseOfTheNearestFacets) {
+  const Eigen::Rotation2Dd turn(0.2);
+  for (const double depth : {0.002, 0.005, 0.01, 0.02}) {
+    itr::Setup<2> setup = blocks<2>({{{0, 0}, {1, 1}, 30}, {{0.21, 1 - depth}, {0.77, 1.5}, 17}});
+    std::vector<Vec<2>> rest = setup.mesh.rest();
+    std::vector<MeshTypes<2>::Cell> cells;
+    std::vector<int> bodies;
+    for (Vec<2>& X : rest) X = turn * X;
+    for (const CellId c : setup.mesh.live_cells()) {
+      cells.push_back(setup.mesh.cell(c));
+      bodies.push_back(setup.mesh.body(c));
+    }
+    EXPECT_NEAR(least_overlap(setup, Mesh<2>(rest, cells, bodies)), depth, 1e-9) << depth;
+  }
+}
+
 /// A block that nothing holds, on one that it touches, gives way to a third that overlaps both: it stores nothing.
 TEST(Overlap, FreeBodiesGiveWay) {
   const auto stored_by = [](const std::vector<Block<2>>& list) {

@@ -1,51 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Decks of CalculiX for assemblies: quadrilaterals of second order where ITR has triangles. /usr/bin/ccx is in Debian's package
-calculix-ccx."""
+"""Decks of CalculiX for assemblies: quadrilaterals of second order where ITR has triangles."""
 import math
-import subprocess
 
 import numpy as np
 
 import make
-
-
-def quadratic_grid(xs, ys, keep=None):
-    """Nodes of a grid, and quadrilaterals of 8 nodes: corners counter-clockwise from the lowest, then middles."""
-    fine_x, fine_y = (np.sort(np.concatenate([v, (v[1:] + v[:-1]) / 2])) for v in (np.asarray(xs, float), np.asarray(ys, float)))
-    number = np.arange(len(fine_x) * len(fine_y)).reshape(len(fine_x), len(fine_y)) + 1
-    cells = []
-    for i in range(0, len(fine_x) - 1, 2):
-        for j in range(0, len(fine_y) - 1, 2):
-            if keep is None or keep(fine_x[i + 1], fine_y[j + 1]):
-                at = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1)]
-                cells.append([number[i + a, j + b] for a, b in at])
-    used = {n for cell in cells for n in cell}
-    return {n: (x, y) for n, (x, y) in zip(number.ravel(), ((x, y) for x in fine_x for y in fine_y)) if n in used}, cells
+from studies import quadratic_grid, run_calculix, section
 
 
 def neo_hooke(E, nu):
     """C10 and D1 of CalculiX."""
     return f"{E / 4 / (1 + nu):.9g}, {6 * (1 - 2 * nu) / E:.9g}"
-
-
-def section(nodes, cells, kind):
-    lines = ["*NODE, NSET=ALL"] + [f"{n}, {x:.12g}, {y:.12g}, 0" for n, (x, y) in nodes.items()]
-    lines.append(f"*ELEMENT, TYPE={kind}, ELSET=BODY")
-    return lines + [f"{k + 1}, " + ", ".join(map(str, cell)) for k, cell in enumerate(cells)]
-
-
-def run(folder, name, lines, columns):
-    """The rows of the .dat file that have so many numbers."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.inp").write_text("\n".join(lines) + "\n")
-    subprocess.run(["ccx", "-i", name], cwd=folder, check=True, capture_output=True)
-    rows = []
-    for line in (folder / f"{name}.dat").read_text().splitlines():
-        try:
-            rows.append([float(word) for word in line.split()])
-        except ValueError:  # a head
-            continue
-    return [row for row in rows if len(row) == columns]
 
 
 def rubber_mount(folder, refine):
@@ -69,7 +34,7 @@ def rubber_mount(folder, refine):
               "*BOUNDARY", "FOOT, 1, 2", "AXIS, 1, 1", "*STEP, NLGEOM, INC=100", "*STATIC", "0.25, 1", "*DLOAD"]
     lines += [f"{k}, P3, {500 / (math.pi * 22**2):.9g}" for k in top]
     lines += ["*NODE PRINT, NSET=TOP", "U", "*END STEP"]
-    return -run(folder, f"mount{refine}", lines, 4)[-1][2]
+    return -run_calculix(folder, f"mount{refine}", lines, 4)[-1][2]
 
 
 def gripper(folder, refine, pressures):
@@ -111,7 +76,7 @@ def gripper(folder, refine, pressures):
     lines += ["*BOUNDARY", "ROOT, 1, 2", "HELD, 1, 2", "*STEP, NLGEOM, INC=1000", "*STATIC", "0.02, 1, 1e-7, 0.05",
               "*DLOAD, AMPLITUDE=GAS"] + [f"{k}, P{face}, 1" for k, face in inner]
     lines += ["*NODE PRINT, NSET=HELD, TOTALS=ONLY", "RF", "*END STEP"]
-    return run(folder, f"gripper{refine}", lines, 3)[-1][:2]
+    return run_calculix(folder, f"gripper{refine}", lines, 3)[-1][:2]
 
 
 TRAVEL = 2.75  # mm, to just before the end of the slope
@@ -138,5 +103,5 @@ def snap_hook(folder, refine):
               "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=NODE TO SURFACE", "CORNER, UNDER",
               "*BOUNDARY", "HELD, 1, 2", "END, 2, 2", "*STEP, NLGEOM, INC=10000", "*STATIC, DIRECT", "0.01, 1",
               "*BOUNDARY", f"END, 1, 1, {TRAVEL}", "*NODE PRINT, NSET=END, TOTALS=ONLY", "RF", "*END STEP"]
-    forces = np.array(run(folder, f"hook{refine}", lines, 3))[:, 0]
+    forces = np.array(run_calculix(folder, f"hook{refine}", lines, 3))[:, 0]
     return np.linspace(TRAVEL / len(forces), TRAVEL, len(forces)), forces

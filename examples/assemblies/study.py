@@ -4,7 +4,8 @@
 CalculiX: study/SCENE.csv.
 
 usage: study.py [-o DIR] [--itr COMMAND] [--levels N] [SCENE...]
-       study.py --table    prints the table of README.md from study/
+
+The table of README.md is made from study/.
 """
 import argparse
 import csv
@@ -12,28 +13,21 @@ import json
 import math
 import pathlib
 import resource
-import subprocess
 
 import numpy as np
 
 import make
 import peers
+import studies
 from make import (ALUMINIUM, BORE, END, FIT, GRAVITY, OVERLAP, RIM, STEEL, STRIP, STRIP_HEIGHT, SUPPORT)
 
 
-def rows(path, name):
-    """Rows of a curve: column -> number."""
-    with open(path, newline="") as file:
-        return [{key: float(value) for key, value in row.items() if key != "name" and value} for row in csv.DictReader(file)
-                if row["name"] == name]
-
-
 def forces(folder, name):
-    return rows(folder / "forces.csv", name)
+    return studies.rows(folder / "forces.csv", name)
 
 
 def points(folder, name):
-    return rows(folder / "points.csv", name)
+    return studies.rows(folder / "points.csv", name)
 
 
 def press_fit_pressure():
@@ -119,11 +113,9 @@ def run(itr, folder, name, level):
     make.make(folder, [name], level)
     results = folder / "results" / name
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([itr, "run", folder / f"{name}.json", "-o", results, "--overwrite", "--threads", "1"], check=True,
-                   capture_output=True)
+    studies.run(itr, folder / f"{name}.json", results)
     seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before.ru_utime
-    subprocess.run([itr, "certify", results], check=True, capture_output=True)
-    summary = json.loads((results / "summary.json").read_text())
+    summary = studies.certified(itr, results)
     steps = [json.loads(line) for line in (results / "steps.jsonl").read_text().splitlines()]
     return results, {"level": level, "vertices": steps[-1]["vertices"], "iterations": sum(s["newton_iterations"] for s in steps),
                      "seconds": round(seconds, 1), "warnings": sum(w["count"] for w in summary["warnings"])}
@@ -143,19 +135,20 @@ def study(itr, folder, name, levels):
     return [row for _, row in runs]
 
 
-def print_table():
-    print("| scene | value | reference | off by [%], on meshes of halved cells | vertices | processor seconds |")
-    print("|---|---|---|---|---|---|")
+def table():
+    lines = ["| scene | value | reference | off by [%], on meshes of halved cells | vertices | processor seconds |",
+             "|---|---|---|---|---|---|"]
     for name in STUDIES:
         with open(make.HERE / "study" / f"{name}.csv", newline="") as file:
-            table = list(csv.DictReader(file))
+            runs = list(csv.DictReader(file))
 
         def column(key):
-            return ", ".join(row[key] for row in table)
+            return ", ".join(row[key] for row in runs)
 
-        for key in [key.removesuffix(": reference") for key in table[0] if key.endswith(": reference")]:
-            print(f"| `{name}` | {key} | {table[0][f'{key}: reference']} | {column(f'{key}: off by [%]')} | {column('vertices')} | "
-                  f"{column('seconds')} |")
+        for key in [key.removesuffix(": reference") for key in runs[0] if key.endswith(": reference")]:
+            lines.append(f"| `{name}` | {key} | {runs[0][f'{key}: reference']} | {column(f'{key}: off by [%]')} | "
+                         f"{column('vertices')} | {column('seconds')} |")
+    return "\n".join(lines)
 
 
 def main():
@@ -164,19 +157,16 @@ def main():
     parser.add_argument("--itr", default="itr")
     parser.add_argument("--levels", type=int, default=3)
     parser.add_argument("scenes", nargs="*", default=list(STUDIES), metavar="SCENE")
-    parser.add_argument("--table", action="store_true")
     options = parser.parse_args()
-    if options.table:
-        return print_table()
     (make.HERE / "study").mkdir(exist_ok=True)
     for name in options.scenes:
-        table = study(options.itr, options.output.resolve(), name, options.levels)
+        runs = study(options.itr, options.output.resolve(), name, options.levels)
         with open(make.HERE / "study" / f"{name}.csv", "w", newline="") as file:
-            writer = csv.DictWriter(file, table[0], lineterminator="\n")
+            writer = csv.DictWriter(file, runs[0], lineterminator="\n")
             writer.writeheader()
-            writer.writerows(table)
-        for row in table:
-            print(f"| `{name}` | " + " | ".join(str(value) for value in row.values()) + " |", flush=True)
+            writer.writerows(runs)
+        print(name, *runs, sep="\n", flush=True)
+    studies.write_table(make.HERE / "README.md", table())
 
 
 if __name__ == "__main__":

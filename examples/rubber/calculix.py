@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Axisymmetric parts without contact as decks of CalculiX (`ccx`, Debian's calculix-ccx), of quadrilaterals of second order
-with reduced integration, which do not lock: what study.py compares with."""
-import re
-import subprocess
-
+"""Axisymmetric parts without contact as decks of CalculiX, with reduced integration, which does not lock."""
 import numpy as np
+
+from studies import quadratic_grid, run_calculix, section
 
 WEDGES = 180  # of which CalculiX solves one
 
@@ -16,35 +14,21 @@ LAWS = {
 
 
 def deck(place, counts, material, moves):
-    nx, ny = 2 * counts[0], 2 * counts[1]
-    grid = [(i, j) for j in range(ny + 1) for i in range(nx + 1) if i % 2 == 0 or j % 2 == 0]
-    number = {at: k + 1 for k, at in enumerate(grid)}
-    lines = ["*NODE"]
-    lines += [f"{k + 1}, {x:.12g}, {y:.12g}, 0" for k, (x, y) in enumerate(place(np.array(grid) / [nx, ny]))]
-    lines += ["*ELEMENT, TYPE=CAX8R, ELSET=PART"]
-    around = ((0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1))
-    for e in range(counts[0] * counts[1]):
-        i, j = 2 * (e % counts[0]), 2 * (e // counts[0])
-        lines.append(", ".join(str(n) for n in [e + 1] + [number[i + a, j + b] for a, b in around]))
+    grid, cells = quadratic_grid(*(np.arange(count + 1) for count in counts))
+    lines = section(dict(zip(grid, place(np.array(list(grid.values())) / counts))), cells, "CAX8R")
     for k, ((axis, end), _) in enumerate(moves):
-        lines += [f"*NSET, NSET=SIDE{k}", *(f"{n}," for at, n in number.items() if at[axis] == (nx, ny)[axis] * end)]
+        lines += [f"*NSET, NSET=SIDE{k}"] + [f"{n}," for n, at in grid.items() if at[axis] == counts[axis] * end]
     law, numbers = LAWS[material["type"]](material)
     lines += ["*MATERIAL, NAME=RUBBER", f"*HYPERELASTIC, {law}"]
     lines += [", ".join(f"{v:.9g}" for v in numbers[k:k + 8]) for k in range(0, len(numbers), 8)]
-    lines += ["*SOLID SECTION, ELSET=PART, MATERIAL=RUBBER"]
+    lines += ["*SOLID SECTION, ELSET=BODY, MATERIAL=RUBBER"]
     lines += ["*STEP, NLGEOM, INC=1000", "*STATIC", "0.05, 1., 1e-6, 0.1", "*BOUNDARY"]
     for k, (_, move) in enumerate(moves):
         lines += [f"SIDE{k}, {c + 1}, {c + 1}, {value:g}" for c, value in enumerate(move)]
-    return "\n".join([*lines, "*NODE PRINT, NSET=SIDE0, TOTALS=ONLY", "RF", "*END STEP", ""])
+    return lines + ["*NODE PRINT, NSET=SIDE0, TOTALS=ONLY", "RF", "*END STEP"]
 
 
 def axial_reaction(folder, place, counts, material, moves):
     """On the first side of `moves` at the end [N]. `place` maps the unit square, of counts[0] x counts[1] elements, to the
     section. `moves`: of sides, as (axis, end), the displacement."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "part.inp").write_text(deck(place, counts, material, moves))
-    run = subprocess.run(["ccx", "part"], cwd=folder, capture_output=True, text=True)
-    totals = re.findall(r"total force.*?time\s+(\S+)\s*\n\s*\n\s*\S+\s+(\S+)\s+\S+", (folder / "part.dat").read_text())
-    if not totals or abs(float(totals[-1][0]) - 1) > 1e-6:
-        raise SystemExit(f"{folder}: ccx stopped before the end\n{run.stdout[-500:]}")
-    return WEDGES * float(totals[-1][1])
+    return WEDGES * run_calculix(folder, "part", deck(place, counts, material, moves), 3)[-1][1]

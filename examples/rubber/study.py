@@ -21,8 +21,9 @@ import h5py
 import numpy as np
 from PIL import Image
 
+import make  # finds modules of the folder above
 import calculix
-import make
+import studies
 
 HERE = pathlib.Path(__file__).resolve().parent
 STUDY = HERE / "study"
@@ -35,21 +36,20 @@ def section(shares):
     return [10, -30] + shares * [10, 60]
 
 
+def forces(run, name):
+    return studies.rows(run / "forces.csv", name)
+
+
 def last(name, column, sign=1):
-    return lambda run: sign * rows_of(run, name)[-1][column]
+    return lambda run: sign * forces(run, name)[-1][column]
 
 
 def largest(name, column, sign=1):
-    return lambda run: max(sign * row[column] for row in rows_of(run, name))
-
-
-def rows_of(run, name):
-    with open(run / "forces.csv", newline="") as file:
-        return [{k: float(v) for k, v in row.items() if k != "name"} for row in csv.DictReader(file) if row["name"] == name]
+    return lambda run: max(sign * row[column] for row in forces(run, name))
 
 
 def first_stiffness(run):
-    row = rows_of(run, "pin")[1]
+    row = forces(run, "pin")[1]
     return row["reaction_x"] / (3 * row["t"])
 
 
@@ -108,10 +108,8 @@ CASES = {
 
 def run(options, scene, folder, *sets):
     if not (options.keep and (folder / "summary.json").exists()):
-        subprocess.run([options.itr, "run", scene, "-o", folder, "--overwrite", "--threads", "1",
-                        *(word for pair in sets for word in ("--set", pair))], check=True, stdout=subprocess.DEVNULL)
-    subprocess.run([options.itr, "certify", folder], check=True, stdout=subprocess.DEVNULL)
-    return json.loads((folder / "summary.json").read_text())
+        studies.run(options.itr, scene, folder, *(word for pair in sets for word in ("--set", pair)))
+    return studies.certified(options.itr, folder)
 
 
 def reference(name, case, options, folder):
@@ -191,13 +189,6 @@ def table():
     return "\n".join(lines)
 
 
-def write_table():
-    page = HERE / "README.md"
-    begin, end = "<!-- table -->\n", "\n<!-- end -->"
-    before, rest = page.read_text().split(begin)
-    page.write_text(before + begin + table() + end + rest.split(end)[1])
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
@@ -210,7 +201,7 @@ def main():
     STUDY.mkdir(exist_ok=True)
     for name in options.scenes or CASES:
         study(name, options)
-    write_table()
+    studies.write_table(HERE / "README.md", table())
     if options.pictures:
         draw(options.runs)
 

@@ -155,8 +155,8 @@ void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const Ve
 }
 
 template <int Dim>
-Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords) {
-  const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords);
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ContactSurface<Dim>& contact,
+                          const ClosedSurface<Dim>& boundary) {
   std::vector<char> left_out;
   if (!setup.ties.empty()) {
     const std::vector<char> tied = tied_vertices(setup, mesh);
@@ -169,17 +169,18 @@ Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, co
     for (int i = 0; i < static_cast<int>(left_out.size()); ++i)
       left_out[i] = contact.map ? std::ranges::any_of(contact.map->sources(i), is_tied) : is_tied(i);
   }
-  return body_boundary(mesh, x, chords).find_overlap(contact.surface.closed, left_out);
+  return boundary.find_overlap(contact.surface.closed, left_out);
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                       \
-  template bool is_closed(const Mesh<Dim>&, int, int);                                             \
-  template bool has_closed_faces(const Mesh<Dim>&, int);                                           \
-  template double coincidence(const Mesh<Dim>&);                                                   \
-  template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                         \
-  template bool has_only_tied_faces(const StepSetup<Dim>&, const Mesh<Dim>&);                      \
-  template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&); \
-  template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const VectorX&, const ChordLevels&);
+#define ITR_INSTANTIATE(Dim)                                                                              \
+  template bool is_closed(const Mesh<Dim>&, int, int);                                                    \
+  template bool has_closed_faces(const Mesh<Dim>&, int);                                                  \
+  template double coincidence(const Mesh<Dim>&);                                                          \
+  template void close_coincident_faces(const StepSetup<Dim>&, Mesh<Dim>&);                                \
+  template bool has_only_tied_faces(const StepSetup<Dim>&, const Mesh<Dim>&);                             \
+  template void open_faces(const StepSetup<Dim>&, const ChordLevels&, const VectorX&, Mesh<Dim>&);        \
+  template Overlap<Dim> find_overlap(const StepSetup<Dim>&, const Mesh<Dim>&, const ContactSurface<Dim>&, \
+                                     const ClosedSurface<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

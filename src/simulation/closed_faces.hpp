@@ -8,6 +8,9 @@
 
 namespace itr {
 
+template <int Dim>
+struct ContactSurface;
+
 /// Whether a node (a vertex, or that of a curved edge) was closed `age` steps ago.
 template <int Dim>
 bool is_closed(const Mesh<Dim>& mesh, int node, int age = 0);
@@ -31,8 +34,9 @@ bool has_only_tied_faces(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
 template <int Dim>
 void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh);
 
-/// How bodies overlap at x, the present positions, but for facets with vertices that ties may bond.
+/// How the bodies of `contact` overlap, whose boundary this is, but for facets with vertices that ties may bond.
 template <int Dim>
-Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const VectorX& x, const ChordLevels& chords);
+Overlap<Dim> find_overlap(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ContactSurface<Dim>& contact,
+                          const ClosedSurface<Dim>& boundary);
 
 }  // namespace itr

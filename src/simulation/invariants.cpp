@@ -42,22 +42,23 @@ std::string find_violation(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, c
   if (const CellId c = find_inverted(mesh, x); c != kNone) return "cell " + std::to_string(c) + " is inverted";
   if (!setup.contact.enabled) return {};
   const ContactSurface<Dim> contact = contact_surface(setup, mesh, chords, age);
+  const VectorX y = contact.positions(x);
+  if (setup.proxy)  // where that is, bodies may overlap
+    return has_intersection<Dim>(contact.surface, y) ? "surfaces intersect" : "";
+  const ClosedSurface<Dim> boundary = body_boundary(mesh, x, chords);
   const double dhat = setup.contact.reach_of_closed();
   const bool has_closed = !contact.surface.closed.empty();
-  const auto overlap = has_closed ? body_boundary(mesh, x, chords).find_overlap(contact.surface.closed) : Overlap<Dim>{};
+  const auto overlap = has_closed ? boundary.find_overlap(contact.surface.closed) : Overlap<Dim>{};
   if (overlap.depth > dhat && std::isfinite(overlap.depth)) return pressed_faces(overlap, dhat, setup.units);
   if (!setup.ties.empty() && !has_only_tied_faces(setup, mesh))  // which may not reach as far as ties
-    if (const auto untied = find_overlap(setup, mesh, x, chords);
+    if (const auto untied = find_overlap(setup, mesh, contact, boundary);
         untied.depth > setup.contact.dhat && std::isfinite(untied.depth))
       return pressed_faces(untied, setup.contact.dhat, setup.units);
-  const VectorX y = contact.positions(x);
   if (const auto pairs = find_intersections<Dim>(contact.surface, y, 1); !pairs.empty()) {
     if (!is_closed_pair<Dim>(contact.surface, pairs[0])) return "surfaces intersect";
     const int vertex = contact.surface.edges[pairs[0][0]][0];
     return pressed_faces<Dim>({std::numeric_limits<double>::infinity(), y.segment<Dim>(Dim * vertex)}, dhat, setup.units);
   }
-  if (setup.proxy) return {};  // where that is, bodies may overlap
-  const ClosedSurface<Dim> boundary = body_boundary(mesh, x, chords);
   if (has_closed ? overlap.depth > dhat : !boundary.nested().empty()) return "a body is inside of another";
   for (Eigen::Index i = Dim * mesh.num_nodes(); i < x.size(); i += Dim)
     if (const Vec<Dim> p = x.segment<Dim>(i); boundary.touches(p) || boundary.winding(p) != 0)

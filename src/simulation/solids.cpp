@@ -183,7 +183,9 @@ Nearest<Dim> Solids<Dim>::find_nearest(std::size_t i, std::size_t point, std::si
   Nearest<Dim> nearest;
   double least = std::numeric_limits<double>::infinity(), best = -1;
   std::vector<int> hits;
-  for (double reach = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach); reach *= 4) {
+  // A query may have left out facets nearer than one that it finds beyond its reach.
+  for (double reach = 0, next = size / static_cast<double>(solids_[j].facets.size()); !(least <= reach); next *= 4) {
+    reach = next;
     hits.clear();
     shape.tree.query(Box<Dim>{p, p}.inflated(reach), hits);
     for (const int f : hits) {
@@ -214,7 +216,8 @@ Nearest<Dim> Solids<Dim>::find_facing(std::size_t i, std::size_t point, std::siz
   Nearest<Dim> nearest;
   double least = std::numeric_limits<double>::infinity();
   std::vector<int> hits;
-  for (double reach = farthest / 1024; !(least <= reach) && reach <= farthest; reach *= 4) {
+  for (double reach = 0, next = farthest / 1024; !(least <= reach) && next <= farthest; next *= 4) {
+    reach = next;
     hits.clear();
     shape.tree.query(Box<Dim>{p, p}.inflated(reach), hits);
     for (const int f : hits) {

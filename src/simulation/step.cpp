@@ -19,6 +19,7 @@
 #include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
+#include "simulation/contact_surface.hpp"
 #include "simulation/effort_clock.hpp"
 #include "simulation/energy_guard.hpp"
 #include "simulation/invariants.hpp"
@@ -350,7 +351,9 @@ class StepSolver {
   void tell_of_closed_faces() const {
     if (has_only_tied_faces(setup_, next_.mesh)) return;
     const auto depth_of = [&](const State<Dim>& state, const VectorX& x) {
-      return find_overlap(setup_, state.mesh, x, state.chords).depth;
+      return find_overlap(setup_, state.mesh, contact_surface(setup_, state.mesh, state.chords),
+                          body_boundary(state.mesh, x, state.chords))
+          .depth;
     };
     const double depth = depth_of(next_, x_);
     if (depth == 0 || depth_of(before_, before_.history.x[0]) > 0) return;

@@ -60,29 +60,39 @@ void add_eigenstrains(const Setup<Dim>& setup, double t, Actions& actions) {
   }
 }
 
-/// The largest that something held moves by between two of some times of the run [m].
+/// Adds what is held at t, and its motion since `before`.
 template <int Dim>
-double find_motion(const Setup<Dim>& setup) {
+void add_moves(const Setup<Dim>& setup, double before, double t, Actions& actions) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  const auto add_held = [&](const RestPoint<Dim>& X, const DirichletCondition<Dim>& condition) {
+    const Vec<Dim> there = condition.displacement(X, t);
+    raise(actions.displacement, there.norm());
+    if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, before)).norm());
+  };
+  for (const auto& condition : setup.dirichlet) {
+    for (VertexId v = 0; v < mesh.node_slots(); ++v)
+      if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
+    for (const FacetId f : mesh.live_facets())
+      if (mesh.facet_tag(f) == condition.tag) add_held(mesh.point(mesh.facet(f)[0]), condition);
+  }
+  for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
+    if (const int motion = setup.obstacles.motion[o]; motion != kNone) {
+      const auto& moves = setup.obstacles.motions[motion];
+      const Vec<Dim>& X = setup.obstacles.rest[o];
+      raise(actions.motion, (moves(X, t) - moves(X, before)).norm());
+    }
+}
+
+/// Adds what moves between times of the run alone, as where held surfaces go and return.
+template <int Dim>
+void add_moves_between(const Setup<Dim>& setup, Actions& actions) {
   constexpr int kTimes = 64;
   const TimeOptions& time = setup.time;
   const int steps = time.steps - time.first_step, times = std::min(steps, kTimes);
   const auto at = [&](int k) {
     return time.time_after(time.first_step + static_cast<int>(static_cast<long long>(k) * steps / times));
   };
-  double motion = 0;
-  const auto add = [&](const auto& moves, const RestPoint<Dim>& X) {
-    for (int k = 1; k <= times; ++k) raise(motion, (moves(X, at(k)) - moves(X, at(k - 1))).norm());
-  };
-  for (const auto& condition : setup.dirichlet) {
-    for (const VertexId v : setup.mesh.live_vertices())
-      if (condition.tag == setup.mesh.vertex_tag(v)) add(condition.displacement, setup.mesh.point(v));
-    for (const FacetId f : setup.mesh.live_facets())
-      if (condition.tag == setup.mesh.facet_tag(f)) add(condition.displacement, setup.mesh.point(setup.mesh.facet(f)[0]));
-  }
-  for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
-    if (const int moves = setup.obstacles.motion[o]; moves != kNone)
-      add(setup.obstacles.motions[moves], setup.obstacles.rest[o]);
-  return motion;
+  for (int k = 1; k <= times; ++k) add_moves(setup, at(k - 1), at(k), actions);
 }
 
 template <int Dim>
@@ -90,21 +100,11 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   const Mesh<Dim>& mesh = setup.mesh;
   add_nodal_loads(setup, t, actions);
   add_eigenstrains(setup, t, actions);
-  const double before = std::max(setup.time.t0, t - setup.time.dt);
+  add_moves(setup, std::max(setup.time.t0, t - setup.time.dt), t, actions);
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
     if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.point(v), t).norm());
-  const auto add_held = [&](const RestPoint<Dim>& X, const DirichletCondition<Dim>& condition) {
-    const Vec<Dim> there = condition.displacement(X, t);
-    raise(actions.displacement, there.norm());
-    if (!setup.time.is_static) raise(actions.motion, (there - condition.displacement(X, before)).norm());
-  };
-  for (const auto& condition : setup.dirichlet)
-    for (VertexId v = 0; v < mesh.node_slots(); ++v)
-      if (mesh.vertex_tag(v) == condition.tag) add_held(mesh.point(v), condition);
   for (const FacetId f : mesh.live_facets()) {
     const RestPoint<Dim> X = mesh.point(mesh.facet(f)[0]);
-    for (const auto& condition : setup.dirichlet)
-      if (condition.tag == mesh.facet_tag(f)) add_held(X, condition);
     for (const auto& condition : setup.neumann)
       if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, condition.traction(X, t).norm());
     for (const auto& condition : setup.pressure)
@@ -113,12 +113,6 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
       if (cavity.pressure && std::ranges::find(cavity.surfaces, mesh.facet_tag(f)) != cavity.surfaces.end())
         raise(actions.traction, std::abs(cavity.pressure(t)));
   }
-  for (std::size_t o = 0; o < setup.obstacles.motion.size(); ++o)
-    if (const int motion = setup.obstacles.motion[o]; motion != kNone) {
-      const auto& moves = setup.obstacles.motions[motion];
-      const Vec<Dim>& X = setup.obstacles.rest[o];
-      raise(actions.motion, (moves(X, t) - moves(X, before)).norm());
-    }
 }
 
 }  // namespace
@@ -133,13 +127,13 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
     actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
   add_loads(setup, time.time_after(time.first_step + 1), actions);
   first = actions;
-  if (time.steps > 1) add_loads(setup, time.time_after(time.first_step + time.steps), actions);
+  if (time.steps > 1) add_loads(setup, time.time_after(time.steps), actions);
   if (!actions.is_any()) return;
+  if (actions.motion == 0 && !time.is_static) add_moves_between(setup, actions);
   const Eigen::Index bodies = history.x[0].size() - Dim * static_cast<Eigen::Index>(setup.obstacles.rest.size());
   const double farthest = history.x[0].head(bodies).template lpNorm<Eigen::Infinity>();
   const double spacing = kSpacing * farthest;
   double motion = actions.motion, strain = 0;
-  if (motion == 0 && !time.is_static && time.steps > 2) motion = find_motion(setup);
   if (!first.is_any()) first = actions;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
