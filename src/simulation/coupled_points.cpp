@@ -54,7 +54,7 @@ CoupledPoints<Dim>::CoupledPoints(const StepSetup<Dim>& setup, const PotentialTe
   }
 }
 
-/// Those that there are of one point.
+/// The terms of one point.
 template <int Dim>
 auto CoupledPoints<Dim>::terms_of(std::size_t i, const VectorX& x) const -> std::vector<Term> {
   std::vector<Term> terms{supports_[i], masses_[i], load_of(surfaces_[i], x)};
