@@ -66,6 +66,35 @@ TEST(Friction, PrimalDualHessiansAreTrueAtTheEndAndNeverIndefinite) {
   for (unsigned seed = 0; seed < 4; ++seed) expect_primal_dual_hessians<3>(ContactScene3(seed, seed % 2, 0.4, 0.03), seed);
 }
 
+/// A vertex has come down upon another one and stands a little beside it, so that their tangent is tilted.
+TEST(Friction, CountsNoApproachAsSlip) {
+  constexpr double kGap = 0.1, kBeside = 0.02, kDhat = 0.2;
+  const ContactOptions options{
+      .enabled = true, .dhat = kDhat, .friction_coefficient = 0.4, .friction_velocity = 5};  // m/s: nothing slides
+  VectorX x(12), lift = VectorX::Zero(12);
+  x << -0.3, -0.2, 0, 0, 0.3, -0.2, kBeside - 0.3, kGap + 0.2, kBeside, kGap, kBeside + 0.3, kGap + 0.2;
+  lift.tail(6) << 0, 1, 0, 1, 0, 1;
+  std::vector<Vec<2>> rest;
+  for (Eigen::Index v = 0; v < 6; ++v) rest.emplace_back(x.segment<2>(2 * v));
+  const CollisionSurface surface =
+      make_collision_surface<2>({{0, 1}, {1, 2}, {3, 4}, {4, 5}}, {}, {}, rest, std::vector<char>(6, 1));
+  const ContactEnergy<2> contact(surface, options, 3, 0.5);
+  Workspace workspace;
+  const auto force_after_fall = [&](double height, bool slips_from_touch) {
+    VectorX reference = x + height * lift;
+    for (Eigen::Index v = 3; v < 6; ++v) reference[2 * v] -= kBeside;
+    FrictionEnergy<2> friction;
+    friction.renew(contact, x, workspace, options, 20, reference, 0.01, slips_from_touch);
+    EXPECT_FALSE(friction.empty());
+    return gradient_of(friction, x);
+  };
+  const VectorX force = force_after_fall(kDhat - kGap, false);
+  EXPECT_GT(force.norm(), 0);
+  for (const double height : {kDhat - kGap, 1.0, 10.0})
+    EXPECT_LE((force_after_fall(height, true) - force).norm(), 1e-12 * force.norm()) << height;
+  EXPECT_GT((force_after_fall(1, false) - force).norm(), 0.5 * force.norm());
+}
+
 TEST(Friction, RelaxedForcesLieOnTheLineBetweenTwo) {
   ContactScene scene(1, false);
   scene.options.friction_coefficient = 0.4;

@@ -4,6 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include "energy/least_motion.hpp"
 #include "itr/solver.hpp"
@@ -127,6 +129,74 @@ TEST(LooseBodies, InAStackLieFlatWithTheFrictionOfContactThatIsThere) {
   }
 }
 
+/// Friction in rounds until it fits, as by the defaults of a scene.
+void settle_friction(ContactOptions& contact, double& lagging_tolerance) {
+  contact.friction_velocity = 0;
+  contact.friction_iterations = -1;
+  lagging_tolerance = 1e-3;
+}
+
+/// Vertices of the lower one are below those of the upper one: tangents of their pairs are tilted, and differ by round.
+TEST(LooseBodies, ThatLandOnTheirMirrorImageSettleInFewRounds) {
+  for (const double depth : {0.3, 0.88624}) {
+    auto setup = boxes_above_a_table();
+    setup.mesh = make_cubes(
+        3,
+        [&](int i, int j, int k) {
+          constexpr double kHeights[] = {0, 0.4, 0.42, 0.82};
+          return Vec<3>(0.3881 * i, kHeights[j], depth * k);
+        },
+        [](int i, int j, int k) { return i < 2 && j != 1 && k < 2 ? 1 + j / 2 : kNone; });
+    settle_friction(setup.contact, setup.lagging_tolerance);
+    linear::Registry registry;
+    Simulation<3> simulation(setup, registry);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    EXPECT_EQ(result.report.cut_steps, 0);
+    EXPECT_LE(result.report.newton_iterations, 200);
+  }
+}
+
+/// Three discs of 24 triangles each, the third one on the two others, above a table.
+Setup<2> pyramid_above_a_table(const std::string& solver) {
+  constexpr int kRim = 24;
+  constexpr double kRadius = 0.5;
+  std::vector<Vec<2>> rest;
+  std::vector<Mesh<2>::Cell> cells;
+  for (const Vec<2>& centre : {Vec<2>(-0.501, 0.502), Vec<2>(0.501, 0.502), Vec<2>(0, 1.37)}) {
+    const int first = static_cast<int>(rest.size());
+    rest.push_back(centre);
+    for (int i = 0; i < kRim; ++i) {
+      const double angle = 2 * std::numbers::pi * (i + 0.3) / kRim;
+      rest.push_back(centre + kRadius * Vec<2>(std::cos(angle), std::sin(angle)));
+      cells.push_back({first, first + 1 + i, first + 1 + (i + 1) % kRim});
+    }
+  }
+  auto setup = square_above_a_table(1e6, solver);
+  setup.mesh = Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
+  setup.obstacles.rest = {{-3, 0}, {3, 0}};
+  setup.contact.dhat = 5e-4;
+  setup.contact.friction_coefficient = 0.5;
+  settle_friction(setup.contact, setup.lagging_tolerance);
+  return setup;
+}
+
+/// It needs a coefficient of tan 15 degrees, 0.27, and friction of contacts that are not there where the step begins.
+TEST(LooseBodies, InAPyramidStandWhateverTheSolver) {
+  std::optional<VectorX> first;
+  for (const std::string solver : {"eigen:ldlt", "eigen:lu", "dense"}) {
+    linear::Registry registry;
+    Simulation<2> simulation(pyramid_above_a_table(solver), registry);
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << solver << ": " << result.reason;
+    const VectorX& x = simulation.state().history.x[0];
+    EXPECT_GT(x[2 * 50 + 1], 1.3) << solver << ": centre of the upper disc";
+    EXPECT_LE(result.report.newton_iterations, 400) << solver;
+    if (!first) first = x;
+    EXPECT_LE((x - *first).lpNorm<Eigen::Infinity>(), 1e-6) << solver;
+  }
+}
+
 TEST(LooseBodies, StayWhereNoForceActs) {
   auto setup = square_above_a_table(1e6);
   setup.body_acceleration = {};
@@ -153,6 +223,38 @@ TEST(LooseBodies, InBalanceDoNotDrift) {
     ASSERT_TRUE(result.ok) << result.reason;
     EXPECT_LE(mean_displacement(simulation).norm(), 1e-9);
     EXPECT_GT(result.report.energy.elastic, 0);
+  }
+}
+
+/// Positions far from the origin have few digits of the displacements, and later steps nothing to do.
+TEST(LooseBodies, InBalanceStayInLaterSteps) {
+  auto setup = square_above_a_table(7.6e5, "dense");
+  const Mesh<2> square = make_square(3, 0.0025);
+  std::vector<Vec<2>> rest;
+  std::vector<Mesh<2>::Cell> cells;
+  for (VertexId v = 0; v < square.node_slots(); ++v) rest.push_back(square.rest(v) + Vec<2>(0.05, -0.09));
+  for (CellId c = 0; c < square.cell_slots(); ++c) cells.push_back(square.cell(c));
+  setup.mesh = Mesh<2>(rest, cells, std::vector<int>(cells.size(), 1));
+  for (const FacetId f : square.live_facets()) setup.mesh.set_facet_tag(f, square.facet_tag(f));
+  setup.order[1] = 2;
+  setup.materials[1].law = MaterialLaw::linear;
+  setup.body_acceleration = {};
+  setup.contact.enabled = false;
+  setup.obstacles = {};
+  setup.time.steps = 4;
+  for (const int side : {1, 3})
+    setup.neumann.push_back({side, [=](const Vec<2>&, double) { return Vec<2>((side - 2) * 1.9e-5, 0); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  ASSERT_TRUE(simulation.advance().ok);
+  const VectorX first = simulation.state().history.x[0];
+  const auto& mesh = simulation.state().mesh;
+  double largest = 0;
+  for (VertexId v = 0; v < mesh.node_slots(); ++v)
+    largest = std::max(largest, (first.segment<2>(2 * v) - mesh.rest(v)).lpNorm<Eigen::Infinity>());
+  for (int step = 1; step < 4; ++step) {
+    ASSERT_TRUE(simulation.advance().ok);
+    EXPECT_LE((simulation.state().history.x[0] - first).lpNorm<Eigen::Infinity>(), 1e-2 * largest) << step;
   }
 }
 

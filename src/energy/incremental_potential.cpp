@@ -123,7 +123,8 @@ void IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& works
   auto& friction = workspace.get<FrictionScratch<Dim>>().last;
   if (!friction || friction.use_count() > 1) friction = std::make_shared<FrictionEnergy<Dim>>();
   const auto lag = [&](ConstVectorView at, ConstVectorView reference) {
-    friction->renew(*contact_, at, workspace, terms_->contact, terms_->velocity_rate, reference, terms_->scaling);
+    friction->renew(*contact_, at, workspace, terms_->contact, terms_->velocity_rate, reference, terms_->scaling,
+                    terms_->slips_from_touch);
   };
   if (map_)
     lag(on_surface(x), on_surface(velocity_reference_.view()));

@@ -147,23 +147,51 @@ LooseParts<Dim> find_loose_parts(const CellSet<Dim>& cells, ConstVectorView x, c
 template <int Dim>
 void LeastMotion<Dim>::follow(ConstVectorView gradient, ConstVectorView sizes, const DofMap& dofs) {
   for (LoosePart<Dim>& part : loose_.parts) {
-    double acting = 0, left = 0;
+    double left = 0;
+    part.acting = 0;
     for (const int node : part.nodes)
       for (int c = 0; c < Dim; ++c) {
         const int i = Dim * node + c;
-        acting += sizes[i];
+        part.acting += sizes[i];
         if (dofs.unknown[i] != kNone) left += std::abs(gradient[i]);
       }
-    const double fade = acting > 0 ? std::clamp(left / acting, kLeastLeft, 1.0) : 1;
-    part.stiffness = std::max(kFraction * fade * acting / part.size, kLeastFraction * scaling_ * part.modulus);
+    const double fade = part.acting > 0 ? std::clamp(left / part.acting, kLeastLeft, 1.0) : 1;
+    part.stiffness = std::max(kFraction * fade * part.acting / part.size, kLeastFraction * scaling_ * part.modulus);
   }
+}
+
+template <int Dim>
+void LeastMotion<Dim>::hold(ConstVectorView anchor, double reach) {
+  anchor_ = std::isfinite(reach) ? VectorX(anchor) : VectorX();
+  for (LoosePart<Dim>& part : loose_.parts) part.hold = part.acting / (reach * part.size);
+}
+
+template <int Dim>
+double LeastMotion<Dim>::value(ConstVectorView x, Workspace& workspace) const {
+  if (anchor_.size() == 0) return 0;
+  VectorX gradient = VectorX::Zero(x.size());
+  add_gradient(x, gradient, workspace);
+  return gradient.dot(x - anchor_) / 2;
+}
+
+template <int Dim>
+void LeastMotion<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
+  if (anchor_.size() == 0) return;
+  const VectorX motion = x - anchor_;
+  for_each_mass<Dim>(cells_, loose_, [&](int part, const auto& nodes, const auto& mass) {
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      for (std::size_t j = 0; j < nodes.size(); ++j)
+        gradient.segment<Dim>(Dim * nodes[i]) += loose_.parts[part].hold *
+                                                 mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *
+                                                 motion.segment<Dim>(Dim * nodes[j]);
+  });
 }
 
 template <int Dim>
 void LeastMotion<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& sink, Workspace&) const {
   std::vector<double> stiffness(loose_.mass.size(), 0);
   for (std::size_t e = 0; e < stiffness.size(); ++e)
-    if (const int part = loose_.of_element[e]; part != kNone) stiffness[e] = loose_.parts[part].stiffness * loose_.mass[e];
+    if (const int part = loose_.of_element[e]; part != kNone) stiffness[e] = loose_.parts[part].curvature() * loose_.mass[e];
   const auto curved = cells_.curved();
   const std::size_t num_straight = stiffness.size() - curved.size();
   sink.target().add_multiples<Dim>(cells_, std::span(stiffness).first(num_straight),
@@ -201,7 +229,7 @@ MatrixX LeastMotion<Dim>::rigid_motions(ConstVectorView x, const DofMap& dofs) c
       Motions product = Motions::Zero();
       for (std::size_t j = 0; j < nodes.size(); ++j)
         product += mass(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * rows[j];
-      gram[part] += loose_.parts[part].stiffness * rows[i].transpose() * product;
+      gram[part] += loose_.parts[part].curvature() * rows[i].transpose() * product;
     }
   });
   MatrixX motions = MatrixX::Zero(x.size(), kModes * static_cast<Eigen::Index>(gram.size()));

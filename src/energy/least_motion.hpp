@@ -17,7 +17,10 @@ struct LoosePart {
   std::vector<int> nodes;
   double size = 0;       ///< diagonal of its box [m]
   double modulus = 0;    ///< largest, times size^(Dim - 2) [N/m]
+  double acting = 0;     ///< sum of the forces that act on it, times the scaling [N]
   double stiffness = 0;  ///< sigma, times the scaling
+  double hold = 0;       ///< that of the proximal term, times the scaling [N/m]
+  double curvature() const { return stiffness + hold; }
 };
 
 /// The loose parts of a set of cells, and what each cell has of their mass.
@@ -31,7 +34,7 @@ struct LooseParts {
 
 /// sigma / 2 |d - d_k|^2 in the mass norm about the iterate d_k itself, for bodies that conditions do not hold: no energy
 /// and no force, only stiffness. A Newton step is then the one of least motion among those that lower the energy alike,
-/// where the Hessian alone is singular.
+/// where the Hessian alone is singular. On request it is a proximal term, too, about positions that stay.
 template <int Dim>
 class LeastMotion final : public Energy {
  public:
@@ -45,9 +48,13 @@ class LeastMotion final : public Energy {
   /// term's Hessian.
   MatrixX rigid_motions(ConstVectorView x, const DofMap& dofs) const;
 
+  /// Adds hold / 2 |x - anchor|^2, by which the forces that act, as last followed, carry a part by `reach` times its size.
+  /// Infinite: nothing.
+  void hold(ConstVectorView anchor, double reach);
+
   std::string_view name() const override { return "least motion"; }
-  double value(ConstVectorView, Workspace&) const override { return 0; }
-  void add_gradient(ConstVectorView, VectorView, Workspace&) const override {}
+  double value(ConstVectorView x, Workspace&) const override;
+  void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const override;
   /// Asks for nothing: vertices that go alone would turn and shift the body.
   bool get_vertex_steps(ConstVectorView x, ConstVectorView dx, VectorView steps, Workspace& workspace) const override;
@@ -56,6 +63,7 @@ class LeastMotion final : public Energy {
   const CellSet<Dim>& cells_;
   LooseParts<Dim> loose_;
   double scaling_;
+  VectorX anchor_;  ///< empty: none
 };
 
 /// The connected parts of which `held` dofs leave a rigid motion free, at positions x. A rank of conditions, not a count:

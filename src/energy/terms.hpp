@@ -37,6 +37,7 @@ struct PotentialTerms {
   ContactOptions contact;
   std::vector<DampingOptions> damping;  ///< empty in statics
   double velocity_rate = 1;             ///< of VelocityRule [1/s]
+  bool slips_from_touch = false;        ///< friction counts no slip of the approach that ends nearer than dhat
   std::vector<TermFactory<Dim>> host;   ///< what the program adds
   double t = 0;                         ///< at the end of the step, for them [s]
   /// Forces of positions, lagged or linearised at those of the cells' vertices; empty: none. On the whole mesh only.

@@ -63,11 +63,13 @@ class CorrectedSystem final : public NewtonSystem {
   /// Makes the residual zero along motions that nothing else resists, and along all of them where projections have not made
   /// the solution another one than that of the true matrix.
   void correct(ConstVectorView rhs, VectorView solution) const {
-    constexpr int kRounds = 2;
+    constexpr int kRounds = 10;
+    constexpr double kGain = 0.5;   ///< of the correction before: one that is not as much smaller is round-off
     constexpr double kKnown = 0.1;  ///< relative: a stiffness that differs by less is the known one
     constexpr double kTrue = 1e-2;  ///< relative residual: the true matrix is as good as the one that was solved with
     if (!product_ || stiffness_.size() == 0 || !solution.allFinite()) return;
     VectorX residual(rhs.size());
+    double last = std::numeric_limits<double>::infinity();
     for (int round = 0; round < kRounds; ++round) {
       product_(solution, residual);
       residual = rhs - residual;
@@ -76,7 +78,8 @@ class CorrectedSystem final : public NewtonSystem {
           stiffness_.unaryExpr([&](double value) { return 1 - kKnown < value && value < most ? 1 / value : 0.0; });
       const VectorX missing = combinations_.transpose() * (by_unknown_.transpose() * residual);
       const VectorX correction = by_unknown_ * (combinations_ * inverse.cwiseProduct(missing));
-      if (!correction.allFinite()) return;
+      if (!(correction.norm() < kGain * last)) return;
+      last = correction.norm();
       solution += correction;
     }
   }

@@ -46,6 +46,10 @@ constexpr int kLooseRounds = 4;                ///< at most: what goes on for lo
 constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
+constexpr double kDigits = 1e-3;  ///< of the tolerance: to which rounds of loose bodies go on while they gain,
+constexpr double kGain = 0.8;     ///< to this part of the residual before, so that all solvers end alike
+constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
 
 }  // namespace
@@ -92,6 +96,7 @@ class LaggedSolve {
     BarrierStiffness best_stiffness = stiffness_;
     bool is_best_loose = loose_force_ > 0;
     double least = std::numeric_limits<double>::infinity();
+    double last_residual = std::numeric_limits<double>::infinity();
     int best_round = 0, round = 1;
     RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
     std::optional<Lagged> now;  // what is lagged at x, where the last round made it
@@ -117,7 +122,10 @@ class LaggedSolve {
         next_lagged = potential_.lag(x, workspace_);
         if (setup_.lagging_tolerance > 0) {
           residual = largest_change(x, next_lagged);
-          is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0;
+          const bool gains_digits =
+              least_motion_ && residual > kDigits * setup_.lagging_tolerance && residual < kGain * last_residual;
+          is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0 && !gains_digits;
+          last_residual = residual;
           if (round > kPlainRounds && lagged_.friction && next_lagged.friction)
             factor = relaxation.factor(residual_of_lagging(x, next_lagged));
         } else {
@@ -177,46 +185,58 @@ class LaggedSolve {
   using Lagged = typename IncrementalPotential<Dim>::Lagged;
   using Traits = TermTraits<Dim>;
   /// The solve of the first round. Bodies that only contact and friction hold begin a step without the contact that will
-  /// hold them, and slide off before the next round unless friction is lagged where contact forces are new: here it is
-  /// lagged again as often as those on a body double or halve on the way (where later rounds settle it: become four times or
-  /// a quarter), and at the end where friction itself would.
+  /// hold them, and would slide off before friction is lagged where contact forces are new. So where these become more than
+  /// `change` times as large or small, the way is taken again by proximal steps (Rockafellar 1976), each with friction
+  /// lagged where it begins: as bodies move in thick oil.
   NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
-    constexpr int kMostOnTheWay = 200, kMostAtTheEnd = 20;
+    if (!least_motion_ || !potential_.has_friction()) return minimize_lagged(x, std::move(step_to_start));
+    constexpr int kMostSteps = 400, kMostAtTheEnd = 20;
+    constexpr double kLeastReach = 1e-3, kGrowth = 4, kLargestReach = 1;
     const double change = setup_.lagging_tolerance > 0 ? 4 : 2;
-    NewtonSummary all;
     const auto is_near = [change](double a, double b) { return a <= change * b && b <= change * a; };
-    const bool may_lag = least_motion_ && potential_.has_friction();
-    VectorX best;
-    double least = std::numeric_limits<double>::infinity();
-    for (int on_the_way = 0, at_the_end = 0;;) {
-      bool is_outdated = false;
-      std::function<bool(const VectorX&)> ends_at;
-      if (may_lag && on_the_way < kMostOnTheWay)
-        ends_at = [&, lagged = contact_forces_on_loose_parts(x)](const VectorX& iterate) {
-          const std::vector<double> now = contact_forces_on_loose_parts(iterate);
-          return is_outdated = !std::equal(now.begin(), now.end(), lagged.begin(), is_near);
+    NewtonSummary all;
+    for (int steps = 0, before_longer = 0, at_the_end = 0;; ++steps) {
+      const VectorX begin = x;
+      const std::vector<double> forces = contact_forces_on_loose_parts(begin);
+      bool has_changed = false;
+      const auto changes = [&](const VectorX& iterate) {
+        const auto has_moved = [&](const LoosePart<Dim>& part) {
+          return std::ranges::any_of(part.nodes, [&](int node) {
+            return (iterate - begin).template segment<Dim>(Dim * node).norm() > kLeastReach * part.size;
+          });
         };
-      NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}), ends_at);
+        if (std::ranges::none_of(least_motion_->parts(), has_moved)) return false;
+        const std::vector<double> now = contact_forces_on_loose_parts(iterate);
+        return has_changed = !std::equal(now.begin(), now.end(), forces.begin(), is_near);
+      };
+      const bool may_be_shorter = reach_ > kLeastReach && steps < kMostSteps;
+      NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}),
+                                              may_be_shorter ? changes : std::function<bool(const VectorX&)>());
       summary.add_effort(all);
       all = std::move(summary);
-      if (!is_outdated && !(may_lag && all.converged() && at_the_end < kMostAtTheEnd)) return all;
+      if (has_changed) {
+        x = begin;
+        reach_ = std::isinf(reach_) ? kLeastReach : std::max(kLeastReach, reach_ / kGrowth);
+        before_longer = static_cast<int>(kGrowth);
+        continue;
+      }
+      const bool is_last = std::isinf(reach_);
       Lagged next = lagged_;
-      potential_.lag_friction(x, workspace_, next);
-      if (!is_outdated && change_of(x, next, is_friction) <= 1 - 1 / change) return all;
+      if (all.converged()) potential_.lag_friction(x, workspace_, next);
+      if (!all.converged() ||
+          (is_last && (at_the_end == kMostAtTheEnd || change_of(x, next, is_friction) <= 1 - 1 / change))) {
+        reach_ = kAnywhere;
+        return all;
+      }
       lagged_ = std::move(next);
-      ++(is_outdated ? on_the_way : at_the_end);
-      if (!is_outdated) continue;
-      const std::vector<double> forces = contact_forces_on_loose_parts(x);
-      const bool all_touch = std::all_of(forces.begin(), forces.end(), [](double force) { return force > 0; });
-      if (const double residual = residual_of(x, lagged_); all_touch && residual < least) {
-        least = residual;
-        best = x;
-      }
-      // A stiff barrier bounces: the last of these iterates may have forces far too large, or none that hold a body.
-      if (on_the_way == kMostOnTheWay && best.size() > 0) {
-        x = best;
-        potential_.lag_friction(x, workspace_, lagged_);
-      }
+      if (is_last)
+        ++at_the_end;
+      else if (steps >= kMostSteps)
+        reach_ = kAnywhere;
+      else if (changes(x))
+        before_longer = 0;
+      else if (--before_longer <= 0)
+        reach_ = kGrowth * reach_ > kLargestReach ? kAnywhere : kGrowth * reach_;
     }
   }
   /// The largest coordinate of what may move [m]; obstacles may reach much farther.
@@ -303,6 +323,8 @@ class LaggedSolve {
     if (least_motion_) {
       all.add(least_motion_);
       follow_least_motion(sum, d);
+      least_motion_->hold(base_ + d, reach_);
+      if (std::isfinite(reach_)) extras.must_be_minimum = false;
       extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
         const bool changed = before && before(iterate);
         follow_least_motion(sum, iterate);
@@ -532,7 +554,8 @@ class LaggedSolve {
 
   StepProblem<Dim>& problem_;
   bool must_settle_;
-  double loose_force_ = 0;  ///< of the forces that act: to which a round is solved that is not the last; 0: as the last
+  double loose_force_ = 0;    ///< of the forces that act: to which a round is solved that is not the last; 0: as the last
+  double reach_ = kAnywhere;  ///< of its size, how far the loads at the start of a solve carry a loose part
   const StepSetup<Dim>& setup_ = problem_.setup_;
   const PotentialTerms<Dim>& terms_ = problem_.terms_;
   const CellSet<Dim>& cells_ = problem_.cells_;

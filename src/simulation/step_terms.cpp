@@ -175,6 +175,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
           .contact = setup.contact,
           .damping = setup.time.is_static ? std::vector<DampingOptions>() : setup.damping,
           .velocity_rate = integrator.velocity_rate(history),
+          .slips_from_touch = !setup.time.has_inertia() && setup.lagging_tolerance > 0,
           .host = std::move(host),
           .t = t,
           .follower = {}};

@@ -123,7 +123,7 @@ FrictionEnergy<Dim>::FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVect
 template <int Dim>
 void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorView x, Workspace& workspace,
                                 const ContactOptions& options, double velocity_rate, ConstVectorView velocity_reference,
-                                double scale) {
+                                double scale, bool slips_from_touch) {
   rate_ = velocity_rate;
   reference_ = velocity_reference;
   epsv_ = contact.law() == ContactLaw::adhesion ? options.adhesion.velocity : options.friction_velocity;
@@ -146,8 +146,19 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .kinetic = kinetic / statics};
     pair.force = lets_go_ ? held * s.weight * options.adhesion.lagged_pull()
                           : statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
+    if (slips_from_touch)
+      pair.approach = approach_of(pair, contact.distance(s, velocity_reference).separation.normalized(), options.dhat);
     pairs_.push_back(pair);
   }
+}
+
+/// Relative motion of a pair along its `normal` at the reference, from there to where it is as near as dhat.
+template <int Dim>
+Vec<Dim> FrictionEnergy<Dim>::approach_of(const Pair& pair, const Vec<Dim>& normal, double dhat) const {
+  double distance = 0;
+  for (int k = 0; k < pair.size; ++k)
+    distance += pair.coefficients[k] * normal.dot(reference_.view().template segment<Dim>(Dim * pair.vertices[k]));
+  return -std::max(0.0, distance - dhat) * normal;
 }
 
 template <int Dim>
@@ -158,7 +169,7 @@ auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) con
     const int dof = Dim * pair.vertices[k];
     relative += pair.coefficients[k] * (x.segment<Dim>(dof) - reference.segment<Dim>(dof));
   }
-  return rate_ * (pair.tangents.transpose() * relative);
+  return rate_ * (pair.tangents.transpose() * (relative - pair.approach));
 }
 
 template <int Dim>

@@ -37,9 +37,11 @@ class FrictionEnergy final : public Energy {
   FrictionEnergy(const ContactEnergy<Dim>& contact, ConstVectorView lagged_x, Workspace& workspace,
                  const ContactOptions& options, const VelocityRule& velocity, double scale);
   /// Makes it what a new one with this `velocity_rate` and `velocity_reference` (see VelocityRule) would be, where nobody
-  /// else goes on with it.
+  /// else goes on with it. `slips_from_touch`: of pairs that are farther than dhat at the reference, their approach along
+  /// the normal there is no slip; tangents where they are lagged may be tilted against it.
   void renew(const ContactEnergy<Dim>& contact, ConstVectorView lagged_x, Workspace& workspace,
-             const ContactOptions& options, double velocity_rate, ConstVectorView velocity_reference, double scale);
+             const ContactOptions& options, double velocity_rate, ConstVectorView velocity_reference, double scale,
+             bool slips_from_touch = false);
   std::string_view name() const override { return "friction"; }
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
@@ -64,11 +66,13 @@ class FrictionEnergy final : public Energy {
     int size;
     Vec<4> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
     Eigen::Matrix<double, Dim, kTangents> tangents;
-    double force;        ///< mu_s * normal force * weight [N]
-    double kinetic = 1;  ///< mu_k by mu_s
+    double force;                          ///< mu_s * normal force * weight [N]
+    double kinetic = 1;                    ///< mu_k by mu_s
+    Vec<Dim> approach = Vec<Dim>::Zero();  ///< relative motion that is no slip [m]
     /// Slip velocity at the iterate [m/s], and friction by the most that it can be: as linearised, the second unknown.
     Vec<kTangents> slip = Vec<kTangents>::Zero(), ratio = Vec<kTangents>::Zero();
   };
+  Vec<Dim> approach_of(const Pair& pair, const Vec<Dim>& normal, double dhat) const;
   Vec<kTangents> slip_velocity(const Pair& pair, ConstVectorView x) const;
   SlipLaw law_of(const Pair& pair) const { return {epsv_, pair.kinetic, lets_go_}; }
 
