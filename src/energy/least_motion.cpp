@@ -167,6 +167,11 @@ void LeastMotion<Dim>::hold(ConstVectorView anchor, double reach) {
 }
 
 template <int Dim>
+bool LeastMotion<Dim>::is_holding() const {
+  return std::ranges::any_of(loose_.parts, [](const LoosePart<Dim>& part) { return part.hold > 0; });
+}
+
+template <int Dim>
 double LeastMotion<Dim>::value(ConstVectorView x, Workspace& workspace) const {
   if (anchor_.size() == 0) return 0;
   VectorX gradient = VectorX::Zero(x.size());

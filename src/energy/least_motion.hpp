@@ -51,6 +51,7 @@ class LeastMotion final : public Energy {
   /// Adds hold / 2 |x - anchor|^2, by which the forces that act, as last followed, carry a part by `reach` times its size.
   /// Infinite: nothing.
   void hold(ConstVectorView anchor, double reach);
+  bool is_holding() const;  ///< any part: not where no force acts
 
   std::string_view name() const override { return "least motion"; }
   double value(ConstVectorView x, Workspace&) const override;

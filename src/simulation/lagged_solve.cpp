@@ -46,7 +46,7 @@ constexpr int kLooseRounds = 4;                ///< at most: what goes on for lo
 constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
-constexpr double kDigits = 1e-3;  ///< of the tolerance: to which rounds of loose bodies go on while they gain,
+constexpr double kDigits = 1e-3;  ///< of the tolerance: to which rounds of bodies that land go on while they gain,
 constexpr double kGain = 0.8;     ///< to this part of the residual before, so that all solvers end alike
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
@@ -123,7 +123,7 @@ class LaggedSolve {
         if (setup_.lagging_tolerance > 0) {
           residual = largest_change(x, next_lagged);
           const bool gains_digits =
-              least_motion_ && residual > kDigits * setup_.lagging_tolerance && residual < kGain * last_residual;
+              has_landed_ && residual > kDigits * setup_.lagging_tolerance && residual < kGain * last_residual;
           is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0 && !gains_digits;
           last_residual = residual;
           if (round > kPlainRounds && lagged_.friction && next_lagged.friction)
@@ -200,12 +200,7 @@ class LaggedSolve {
       const std::vector<double> forces = contact_forces_on_loose_parts(begin);
       bool has_changed = false;
       const auto changes = [&](const VectorX& iterate) {
-        const auto has_moved = [&](const LoosePart<Dim>& part) {
-          return std::ranges::any_of(part.nodes, [&](int node) {
-            return (iterate - begin).template segment<Dim>(Dim * node).norm() > kLeastReach * part.size;
-          });
-        };
-        if (std::ranges::none_of(least_motion_->parts(), has_moved)) return false;
+        if (!moves_loose_parts(iterate - begin, kLeastReach)) return false;
         const std::vector<double> now = contact_forces_on_loose_parts(iterate);
         return has_changed = !std::equal(now.begin(), now.end(), forces.begin(), is_near);
       };
@@ -218,9 +213,10 @@ class LaggedSolve {
         x = begin;
         reach_ = std::isinf(reach_) ? kLeastReach : std::max(kLeastReach, reach_ / kGrowth);
         before_longer = static_cast<int>(kGrowth);
+        has_landed_ = true;
         continue;
       }
-      const bool is_last = std::isinf(reach_);
+      const bool is_last = !least_motion_->is_holding();
       Lagged next = lagged_;
       if (all.converged()) potential_.lag_friction(x, workspace_, next);
       if (!all.converged() ||
@@ -238,6 +234,13 @@ class LaggedSolve {
       else if (--before_longer <= 0)
         reach_ = kGrowth * reach_ > kLargestReach ? kAnywhere : kGrowth * reach_;
     }
+  }
+  /// Whether a node of a loose part moves by more than `fraction` of the part's size.
+  bool moves_loose_parts(const VectorX& motion, double fraction) const {
+    return std::ranges::any_of(least_motion_->parts(), [&](const LoosePart<Dim>& part) {
+      return std::ranges::any_of(
+          part.nodes, [&](int node) { return motion.template segment<Dim>(Dim * node).norm() > fraction * part.size; });
+    });
   }
   /// The largest coordinate of what may move [m]; obstacles may reach much farther.
   double farthest_unknown() const {
@@ -324,7 +327,7 @@ class LaggedSolve {
       all.add(least_motion_);
       follow_least_motion(sum, d);
       least_motion_->hold(base_ + d, reach_);
-      if (std::isfinite(reach_)) extras.must_be_minimum = false;
+      if (least_motion_->is_holding()) extras.must_be_minimum = false;
       extras.after_step = [&, before = extras.after_step](const VectorX& iterate) {
         const bool changed = before && before(iterate);
         follow_least_motion(sum, iterate);
@@ -555,6 +558,7 @@ class LaggedSolve {
   StepProblem<Dim>& problem_;
   bool must_settle_;
   double loose_force_ = 0;    ///< of the forces that act: to which a round is solved that is not the last; 0: as the last
+  bool has_landed_ = false;   ///< a loose part, by proximal steps
   double reach_ = kAnywhere;  ///< of its size, how far the loads at the start of a solve carry a loose part
   const StepSetup<Dim>& setup_ = problem_.setup_;
   const PotentialTerms<Dim>& terms_ = problem_.terms_;
