@@ -181,7 +181,7 @@ Setup<2> pyramid_above_a_table(const std::string& solver) {
   return setup;
 }
 
-/// It needs a coefficient of tan 15 degrees, 0.27, and friction of contacts that are not there where the step begins.
+/// To stand needs a coefficient of tan 15 degrees, 0.27, and friction of contacts that are not there where the step begins.
 TEST(LooseBodies, InAPyramidStandWhateverTheSolver) {
   std::optional<VectorX> first;
   for (const std::string solver : {"eigen:ldlt", "eigen:lu", "dense"}) {
