@@ -42,6 +42,7 @@ constexpr double kLoadsWorthSaying = 1e-2;     ///< of what loads may be off: le
 constexpr double kFrictionWorthSaying = 1e-2;  ///< of friction's forces: less is not said
 constexpr int kPatience = 30;                  ///< rounds without a smaller residual after which lagging will not converge
 constexpr double kLooseForce = 1e-2;           ///< of the forces that act: to which the first round is solved
+constexpr double kProximalForce = 1e-3;        ///< of the forces that act: to which proximal steps are solved
 constexpr int kLooseRounds = 4;                ///< at most: what goes on for longer may do so because rounds are not exact
 constexpr int kPlainRounds = 10;               ///< after which rounds are relaxed
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
@@ -84,7 +85,6 @@ class LaggedSolve {
     }
     problem_.rounds_ = 0;
     regularized_about_ = lagged_x;
-    loose_force_ = asked_of_round(1);
     NewtonSummary summary = minimize_first(x, std::move(step_to_start));
     problem_.rounds_ = 1;
     summary.assembly_seconds += lagging_seconds;
@@ -189,6 +189,7 @@ class LaggedSolve {
   /// `change` times as large or small, the way is taken again by proximal steps (Rockafellar 1976), each with friction
   /// lagged where it begins: as bodies move in thick oil.
   NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
+    loose_force_ = asked_of_round(1);
     if (!least_motion_ || !potential_.has_friction()) return minimize_lagged(x, std::move(step_to_start));
     constexpr int kMostSteps = 400, kMostAtTheEnd = 20;
     constexpr double kLeastReach = 1e-3, kGrowth = 4, kLargestReach = 1;
@@ -205,6 +206,7 @@ class LaggedSolve {
         return has_changed = !std::equal(now.begin(), now.end(), forces.begin(), is_near);
       };
       const bool may_be_shorter = reach_ > kLeastReach && steps < kMostSteps;
+      loose_force_ = std::min(asked_of_round(1), std::isinf(reach_) ? kLooseForce : kProximalForce);
       NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}),
                                               may_be_shorter ? changes : std::function<bool(const VectorX&)>());
       summary.add_effort(all);
