@@ -33,8 +33,6 @@ from harness.report import write_report  # noqa: E402
 from harness.suite import Context, load_cases, run_case, save_json  # noqa: E402
 
 ROOT = HERE.parent
-
-
 def versions(build):
     """Of the programs and packages that the figures come from."""
     found = {"python": sys.version.split()[0]}
@@ -56,8 +54,18 @@ def parse():
     return parser.parse_args()
 
 
+def compile_plainly():
+    """Lets DOLFINx compile its forms without optimisation, which takes longer than what quick cases do with them."""
+    if importlib.util.find_spec("dolfinx"):
+        jit = importlib.import_module("dolfinx.jit")
+        for name in {"DOLFINX_DEFAULT_JIT_PARAMETERS", "DOLFINX_DEFAULT_JIT_OPTIONS"} & set(vars(jit)):  # by version
+            vars(jit)[name]["cffi_extra_compile_args"] = (["-O0", "-g0"], "")
+
+
 def perform(name, options, build, report):
     """The entry of a case, which prints its results as they come."""
+    if options.quick:
+        compile_plainly()
     folder = build / ("verification-quick-runs" if options.quick else "verification-runs") / name
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
