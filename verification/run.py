@@ -33,6 +33,9 @@ from harness.report import write_report  # noqa: E402
 from harness.suite import Context, load_cases, run_case, save_json  # noqa: E402
 
 ROOT = HERE.parent
+LONG = {"matrices", "orders", "simple", "squeeze", "stability", "statics"}  # begun first, so that none is left alone at the end
+
+
 def versions(build):
     """Of the programs and packages that the figures come from."""
     found = {"python": sys.version.split()[0]}
@@ -92,7 +95,8 @@ def perform_all(chosen, options, build, report):
         yield from ((name, perform(name, options, build, report)) for name in chosen)
         return
     with concurrent.futures.ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        pending = {pool.submit(perform_quietly, name, options, build, report): name for name in chosen}
+        longest_first = sorted(chosen, key=lambda name: name not in LONG)
+        pending = {pool.submit(perform_quietly, name, options, build, report): name for name in longest_first}
         for done in concurrent.futures.as_completed(pending):
             entry, text = done.result()
             print(text, end="", flush=True)
