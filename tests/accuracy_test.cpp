@@ -22,7 +22,7 @@ AccuracyWatch watch(double accuracy, const TimeOptions& time = kIncrements, bool
   RemeshOptions remesh;
   remesh.enabled = true;
   remesh.relative_tolerance = kFirst;
-  return {asked, time, remesh};
+  return {asked, time, remesh, true};
 }
 
 /// A step whose mesh is wrong by this part of an energy of 1 J.
@@ -113,7 +113,7 @@ TEST(Accuracy, OfAForceOrAPoint) {
   scene::Accuracy asked;
   asked.value = 0.01;
   asked.of = "plate";
-  AccuracyWatch run(asked, kIncrements, {});
+  AccuracyWatch run(asked, kIncrements, {}, false);
   const std::string errors = "_error_mesh,all_x_error_dhat,all_x_error_friction,all_x_error_lag,all_x_error_solver";
   const std::string forces = "step,t,name,all_x,all_x" + errors + "\n1,0,plate,10,1,1,1,1,1\n2,1,plate,100,-3,0.5,0,0,0\n";
   EXPECT_NE(run.describe(forces, "").find("accuracy of plate: 1 % asked, 3.5 % estimated (mesh 3, dhat 0.5): not reached"),

@@ -32,8 +32,13 @@ bool is_first_order(const TimeOptions& time) {
 
 }  // namespace
 
-AccuracyWatch::AccuracyWatch(const scene::Accuracy& asked, const TimeOptions& time, const RemeshOptions& remesh)
-    : asked_(asked), time_(time), is_remeshed_(remesh.enabled), first_tolerance_(remesh.relative_tolerance) {}
+AccuracyWatch::AccuracyWatch(const scene::Accuracy& asked, const TimeOptions& time, const RemeshOptions& remesh,
+                             bool depends_on_path)
+    : asked_(asked),
+      time_(time),
+      is_remeshed_(remesh.enabled),
+      depends_on_path_(depends_on_path),
+      first_tolerance_(remesh.relative_tolerance) {}
 
 double AccuracyWatch::relative_tolerance() const { return std::ldexp(first_tolerance_, -halvings_); }
 
@@ -80,7 +85,7 @@ std::optional<double> AccuracyWatch::finer(const StepReport& report, double ener
   }
   ++trials_;
   error_before_ = error;
-  last_halvings_ = std::min(kMostHalvings, static_cast<int>(std::ceil(2 * std::log2(error))));
+  last_halvings_ = std::clamp(static_cast<int>(std::lround(2 * std::log2(error))), 1, kMostHalvings);
   halvings_ += last_halvings_;
   return relative_tolerance();
 }
@@ -115,7 +120,8 @@ void AccuracyWatch::add(const StepReport& report, double energy) {
 /// other.
 double AccuracyWatch::time_error() const {
   if (!time_.adaptive.enabled || energy_ == 0) return 0;
-  if (!time_.has_inertia()) return worst_chord_ * worst_chord_;
+  if (!time_.has_inertia())  // energies of increments are those of equilibria, and a peak between them may be missed
+    return depends_on_path_ || asked_.of != "energy" ? worst_chord_ * worst_chord_ : 0;
   const double impact = has_contact_ ? time_.adaptive.tolerance : 0;
   return impact + (is_first_order(time_) ? 2 * time_sum_ / std::sqrt(energy_) : std::sqrt(time_sum_ / energy_));
 }

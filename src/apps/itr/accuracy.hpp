@@ -16,7 +16,8 @@ namespace itr::cli {
 /// tolerance of remeshing from step to step, and says at the end what was reached.
 class AccuracyWatch {
  public:
-  AccuracyWatch(const scene::Accuracy& asked, const TimeOptions& time, const RemeshOptions& remesh);
+  /// `depends_on_path`: whether solutions without inertia depend on the steps before.
+  AccuracyWatch(const scene::Accuracy& asked, const TimeOptions& time, const RemeshOptions& remesh, bool depends_on_path);
 
   bool is_asked() const { return asked_.value > 0; }
   /// Goes on after the steps of this text of steps.jsonl. With inertia it knows nothing of them.
@@ -42,7 +43,7 @@ class AccuracyWatch {
 
   scene::Accuracy asked_;
   TimeOptions time_;
-  bool is_remeshed_;
+  bool is_remeshed_, depends_on_path_;
   double first_tolerance_;
   int halvings_ = 0;                    ///< of it
   int trials_ = 0, last_halvings_ = 0;  ///< of this step

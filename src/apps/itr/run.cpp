@@ -254,6 +254,12 @@ class Unlocked {
 };
 
 template <int Dim>
+bool depends_on_path(const Setup<Dim>& setup) {
+  return setup.contact.has_friction() || !setup.damping.empty() ||
+         std::ranges::any_of(setup.materials, [](const auto& entry) { return !entry.second.prony.empty(); });
+}
+
+template <int Dim>
 class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, output::Folder folder, const RunOptions& options, int threads,
@@ -264,7 +270,8 @@ class Run {
         warnings_(warnings),
         units_(scene.output.units),
         simulation_(std::move(setup), registry, make_logger(warnings)),
-        accuracy_(scene.accuracy, simulation_.setup().time, simulation_.setup().remesh) {
+        accuracy_(scene.accuracy, simulation_.setup().time, simulation_.setup().remesh,
+                  depends_on_path(simulation_.setup())) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(),
                                simulation_.solver_name(),
