@@ -26,25 +26,28 @@ class Runs(unittest.TestCase):
     def tearDownClass(cls):
         cls.temporary.cleanup()
 
-    def check_true_errors(self, name):
+    def check_true_errors(self, name, scene):
         errors = []
-        for row in accuracy.compare(ITR, name, accuracy.SCENES[name], self.folder):
+        for row in accuracy.compare(ITR, name, scene, self.folder):
             if not row["asked"]:
                 continue
             errors.append(row["true"])
             self.assertLess(row["true"], 2 * row["asked"], row)
-            self.assertEqual(row["said"] == "reached", row["estimated"] <= row["asked"] * 1.005, row)
+            self.assertEqual("not reached" not in row["said"], row["estimated"] <= row["asked"] * 1.05, row)
         self.assertEqual(len(errors), 3)
-        self.assertLess(errors[2], errors[0], "a tighter accuracy gives a smaller error")
+        return errors
 
     def test_quasistatic_and_remeshed(self):
-        self.check_true_errors("cook pulled")
+        errors = self.check_true_errors("cook pulled", accuracy.SCENES["cook pulled"])
+        self.assertLess(errors[2], errors[0] / 2, "a tighter accuracy gives a smaller error")
 
     def test_dynamics(self):
-        self.check_true_errors("beam plucked")
+        scene = accuracy.Scene(accuracy.plucked, end=0.1, tolerance=3e-3, times=20, remesh=False)
+        self.check_true_errors("beam plucked", scene)
 
     def test_contact(self):
-        self.check_true_errors("block pressed")
+        errors = self.check_true_errors("block pressed", accuracy.SCENES["block pressed"])
+        self.assertLess(errors[2], errors[0] / 2, "a tighter accuracy gives a smaller error")
 
     def scene(self, name, changes=None):
         content = accuracy.SCENES["cook pulled"].content(types.SimpleNamespace(folder=self.folder))

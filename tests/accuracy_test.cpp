@@ -89,7 +89,11 @@ TEST(Accuracy, EndSaysWhetherItWasReached) {
   StepReport none = step(0);
   none.errors.no_bar = "the solution is not stable";
   run.add(none, 2);
-  EXPECT_NE(run.describe("", "").find("no bar in 1 of 4 steps: the solution is not stable"), std::string::npos);
+  run.add(step(3), 2);
+  EXPECT_NE(run.describe("", "").find("5.5 % estimated"), std::string::npos);
+  EXPECT_NE(run.describe("", "").find("no bar in 2 of 5 steps: it would exceed half of the energy"), std::string::npos);
+  run.add(none, 2);
+  EXPECT_NE(run.describe("", "").find("no bar in 3 of 6 steps: the solution is not stable"), std::string::npos);
 }
 
 TEST(Accuracy, ErrorInTimeIsByTheIntegrator) {

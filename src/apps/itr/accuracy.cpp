@@ -23,6 +23,7 @@ constexpr double kAgain = 1.25, kTooFine = 0.5;  ///< of what the mesh may be wr
 constexpr double kAimed = 0.7;                   ///< of it, by a coarser mesh
 constexpr int kMostTrials = 3;
 constexpr int kMostHalvings = 6, kMostDoublings = 2;  ///< of the tolerance, at once
+constexpr double kUnresolved = 0.5;                   ///< of the energy: a larger bar tells nothing
 constexpr double kGrowsFast = 2;                      ///< the energy in a step
 constexpr double kHelps = 0.9;                        ///< of the error before, that of a finer mesh at most
 
@@ -101,11 +102,6 @@ void AccuracyWatch::add(const StepReport& report, double energy) {
   time_sum_ += is_first_order(time_) ? report.time_error * std::sqrt(energy)  // of one sign
                                      : report.time_error * report.time_error * energy;
   energy_ = std::max(energy_, energy);
-  if (!report.errors.is_asked || !report.errors.no_bar.empty()) {
-    ++steps_without_bar_;
-    no_bar_ = report.errors.is_asked ? report.errors.no_bar : "/output/error_bars is false";
-    return;
-  }
   Parts parts{};
   double sum = 0, worst = 0;
   for (int s = 0; s < kErrorSources; ++s) {
@@ -113,7 +109,14 @@ void AccuracyWatch::add(const StepReport& report, double energy) {
     sum += parts[s];
     worst += worst_[s];
   }
-  if (sum > worst) worst_ = parts;
+  if (report.errors.is_asked && report.errors.no_bar.empty() && sum <= kUnresolved * energy) {
+    if (sum > worst) worst_ = parts;
+    return;
+  }
+  ++steps_without_bar_;
+  no_bar_ = !report.errors.is_asked        ? "/output/error_bars is false"
+            : report.errors.no_bar.empty() ? "it would exceed half of the energy"
+                                           : report.errors.no_bar;
 }
 
 /// Estimates how far steps put the energy off. Of implicit Euler errors add up; others are taken as independent of each
