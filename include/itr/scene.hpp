@@ -40,6 +40,15 @@ struct ChosenDefaults {
   std::string information;                  ///< a line on a scene that may expect the other set; or nothing
 };
 
+/// The error that a scene asks for by /accuracy, and what follows from it (docs/theory.md, "Accuracy").
+struct Accuracy {
+  double value = 0;                            ///< relative; 0: none is asked for
+  std::string of = "energy";                   ///< or a name of /output/forces or /output/points
+  std::vector<ChosenDefaults::Value> derived;  ///< keys that the scene leaves open
+  std::vector<std::string> kept;               ///< a sentence on each value of the scene that stays, and on a fixed mesh
+  bool follows_bars = false;                   ///< whether the tolerance of remeshing may change from step to step
+};
+
 struct Scene {
   std::variant<Setup<2>, Setup<3>> setup;  ///< the dimension is chosen here, once
   OutputOptions output;
@@ -48,6 +57,7 @@ struct Scene {
   std::vector<std::string> warnings;  ///< on values that are legal and suspicious
   PartNames parts;
   ChosenDefaults defaults;
+  Accuracy accuracy{};
   std::string identity;  ///< JSON of all that the results depend on: the merged scene, hashes of its files
 };
 

@@ -22,6 +22,8 @@ void check_positive_unless(const Node& node, const std::vector<const char*>& wor
   node.positive(1);
 }
 
+constexpr double kMostAccuracy = 0.5;
+
 /// Checks of kinds whose values their readers do not check.
 const std::map<std::string, void (*)(const Node&)> kChecks = {
     {"number", [](const Node& node) { node.number(0); }},
@@ -39,6 +41,11 @@ const std::map<std::string, void (*)(const Node&)> kChecks = {
      }},
     {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }},
     {"positive or auto", [](const Node& node) { check_positive_unless(node, {"auto"}, "a number > 0, or \"auto\""); }},
+    {"accuracy",
+     [](const Node& node) {
+       if (!node.json().is_number()) node.fail("a number of (0, 0.5], or an object with value");
+       if (node.positive(1) > kMostAccuracy) node.fail("a number of (0, 0.5]");
+     }},
     {"positive, auto or adaptive", [](const Node& node) {
        check_positive_unless(node, {"auto", "adaptive"}, "a number > 0, \"auto\" or \"adaptive\"");
      }}};

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "accuracy.hpp"
 #include "defaults.hpp"
 #include "geometry.hpp"
 #include "mesh/facet_tags.hpp"
@@ -246,6 +247,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   check_keys(document, scene.warnings);
   MeshFiles files;
   const Json as_written = document.json;
+  scene.accuracy = apply_accuracy(document);
   scene.defaults = apply_defaults(document);
   const Geometries geometries = list_geometries(root);
   scene.identity = make_identity(as_written, scene.defaults.name, root, geometries, files);
@@ -262,6 +264,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
     scene.setup = read_setup<2>(root, geometries, files, scene.parts, scene.warnings);
   else
     scene.setup = read_setup<3>(root, geometries, files, scene.parts, scene.warnings);
+  std::visit([&](auto& setup) { apply_accuracy(root, scene.accuracy, setup); }, scene.setup);
   std::visit([&](const auto& setup) { scene.output.times = setup.time.adaptive; }, scene.setup);
   return scene;
 }
@@ -276,6 +279,7 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
   const Node root(document);
   for (const char* key : {"geometry", "output"})
     if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");
+  if (root.has("accuracy")) root["accuracy"].fail("the key", "no such key: a program chooses steps and tolerances itself");
   if (!read_units(root).is_si()) root["units"].fail("SI units: a program brings its geometry in metres");
   const Sets sets = sets_of(geometry);
   Setup<Dim> setup;

@@ -28,6 +28,7 @@ STORED = {
     "verification/stability/results.csv": CODE,
     "verification/needs/results.csv": CODE,
     "verification/adaptive/results.csv": CODE,
+    "verification/adaptive/accuracy.csv": CODE,
     **{str(path.relative_to(ROOT)): CODE for path in sorted([*PAPER.glob("*/study.json"), *PAPER.glob("*/steps.csv")])},
 }
 # Tables that the report's cases and the studies write beside what STORED names, and runs that have a made of their own.

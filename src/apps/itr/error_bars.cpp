@@ -33,10 +33,10 @@ std::vector<std::string> split(const std::string& line) {
 
 double number(const std::string& cell) { return cell.empty() ? std::nan("") : std::strtod(cell.c_str(), nullptr); }
 
-/// The largest force of each curve, by its name. Errors are those along it.
-std::map<std::string, Peak> find_peaks(const std::string& forces) {
+/// The largest vector of each name in a text of rows, of columns that begin so. Errors are those along it.
+std::map<std::string, Peak> find_peaks(const std::string& rows, const std::string& prefix) {
   std::map<std::string, Peak> peaks;
-  std::istringstream text(forces);
+  std::istringstream text(rows);
   std::string line;
   std::getline(text, line);
   std::map<std::string, std::size_t> columns;
@@ -46,7 +46,7 @@ std::map<std::string, Peak> find_peaks(const std::string& forces) {
     std::map<std::string, double> force;
     double size = 0;
     for (const char* axis : {"x", "y", "z"})
-      if (const auto column = columns.find(std::string("all_") + axis); column != columns.end()) {
+      if (const auto column = columns.find(prefix + axis); column != columns.end()) {
         const double value = force[column->first] = number(cells.at(column->second));
         size = std::hypot(size, value);
       }
@@ -66,9 +66,6 @@ std::map<std::string, Peak> find_peaks(const std::string& forces) {
 
 /// "1.6 % (mesh 0.9, dhat 0.4): refine the mesh first", of a value of this size.
 std::string describe(double size, const BySource& errors) {
-  static constexpr std::array<const char*, kErrorSources> kAdvice{
-      "refine the mesh first", "a smaller /contact/dhat first", "a smaller /contact/epsv first",
-      "more /solver/contact/friction_iterations first", "a smaller tolerance of /solver/nonlinear first"};
   constexpr double kWorthNaming = 0.05;  // of the sum
   double sum = 0;
   for (const double error : errors) sum += std::abs(error);
@@ -79,7 +76,8 @@ std::string describe(double size, const BySource& errors) {
                            100 * std::abs(errors[s]) / size);
   const auto largest =
       std::max_element(errors.begin(), errors.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  return fmt::format("{:.2g} % ({}): {}", 100 * sum / size, parts, kAdvice[largest - errors.begin()]);
+  return fmt::format("{:.2g} % ({}): {}", 100 * sum / size, parts,
+                     advice_of(static_cast<ErrorSource>(largest - errors.begin())));
 }
 
 bool is_known(const BySource& errors) {
@@ -88,10 +86,32 @@ bool is_known(const BySource& errors) {
 
 }  // namespace
 
+std::string advice_of(ErrorSource source) {
+  static constexpr std::array<const char*, kErrorSources> kAdvice{
+      "refine the mesh first", "a smaller /contact/dhat first", "a smaller /contact/epsv first",
+      "more /solver/contact/friction_iterations first", "a smaller tolerance of /solver/nonlinear first"};
+  return kAdvice.at(static_cast<std::size_t>(source));
+}
+
+std::optional<std::array<double, kErrorSources>> relative_peak_error(const std::string& name, const std::string& forces,
+                                                                     const std::string& points) {
+  for (const auto& [rows, prefix] : {std::pair(&forces, "all_"), std::pair(&points, "u_")}) {
+    if (rows->find(fmt::format("{}x_error_", prefix)) == rows->npos) continue;  // nobody asked for bars
+    const auto peaks = find_peaks(*rows, prefix);
+    const auto found = peaks.find(name);
+    if (found == peaks.end()) continue;
+    BySource errors = found->second.errors;
+    if (!(found->second.size > 0) || !is_known(errors)) return std::nullopt;
+    for (double& error : errors) error = std::abs(error) / found->second.size;
+    return errors;
+  }
+  return std::nullopt;
+}
+
 std::vector<std::string> describe_errors(const std::string& forces, const StepReport& last, const Units& units) {
   std::vector<std::string> lines;
   if (!last.errors.is_asked) return lines;
-  for (const auto& [name, peak] : find_peaks(forces)) {
+  for (const auto& [name, peak] : find_peaks(forces, "all_")) {
     if (!(peak.size > 0)) continue;
     const std::string force = fmt::format("{:.4g} {}", peak.size, units.name("N"));
     if (is_known(peak.errors))

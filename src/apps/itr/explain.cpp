@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "accuracy.hpp"
 #include "advice.hpp"
 #include "core/connected_parts.hpp"
 #include "energy/elastic/law_table.hpp"
@@ -70,12 +71,13 @@ template <int Dim>
 class Explanation {
  public:
   /// Throws InputError for what `run` would refuse.
-  Explanation(const Setup<Dim>& setup, linear::Registry& registry, const scene::ChosenDefaults& defaults,
+  Explanation(const Setup<Dim>& setup, linear::Registry& registry, const scene::Scene& scene,
               std::vector<std::string> warnings)
       : registry_(registry),
         simulation_(setup, registry_, Logger([this](LogLevel, std::string_view text) { chosen_.emplace_back(text); })),
         setup_(simulation_.setup()),
-        defaults_(defaults),
+        defaults_(scene.defaults),
+        accuracy_(scene.accuracy),
         warnings_(std::move(warnings)) {
     for (std::string& found : find_suspicious(simulation_)) warnings_.push_back(std::move(found));
   }
@@ -97,6 +99,8 @@ class Explanation {
     fmt::print("linear solver\n  {}\n", solver(matrix));
     if (setup_.contact.enabled) contact();
     defaults();
+    if (accuracy_.value > 0) fmt::print("accuracy\n");
+    for (const std::string& line : describe_accuracy(accuracy_)) fmt::print("  {}\n", line);
     fmt::print("warnings\n");
     if (warnings_.empty()) fmt::print("  none\n");
     for (const auto& warning : warnings_) fmt::print("  warning: {}\n", warning);
@@ -265,6 +269,7 @@ class Explanation {
   const Simulation<Dim> simulation_;
   const Setup<Dim>& setup_;
   const scene::ChosenDefaults& defaults_;
+  const scene::Accuracy& accuracy_;
   std::vector<std::string> warnings_;
 };
 
@@ -358,7 +363,7 @@ int explain(const RunOptions& options) {
       [&](auto& setup) {
         const SolverChoice choice = choose_solver(setup.linear, options, registry);
         for (const auto& warning : choice.warnings) scene.warnings.push_back(warning);
-        Explanation(setup, registry, scene.defaults, scene.warnings).print(scene.output.units);
+        Explanation(setup, registry, scene, scene.warnings).print(scene.output.units);
       },
       scene.setup);
   return done;

@@ -19,10 +19,12 @@
 #include <thread>
 #include <utility>
 
+#include "accuracy.hpp"
 #include "advice.hpp"
 #include "core/parallel.hpp"
 #include "core/process.hpp"
 #include "core/profile.hpp"
+#include "core/read_file.hpp"
 #include "core/timer.hpp"
 #include "error_bars.hpp"
 #include "itr/core.hpp"
@@ -31,6 +33,8 @@
 #include "output/profile_file.hpp"
 #include "output/warnings.hpp"
 #include "ranks.hpp"
+#include "simulation/state.hpp"
+#include "simulation/step.hpp"
 
 namespace itr::cli {
 
@@ -250,6 +254,12 @@ class Unlocked {
 };
 
 template <int Dim>
+bool depends_on_path(const Setup<Dim>& setup) {
+  return setup.contact.has_friction() || !setup.damping.empty() ||
+         std::ranges::any_of(setup.materials, [](const auto& entry) { return !entry.second.prony.empty(); });
+}
+
+template <int Dim>
 class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, output::Folder folder, const RunOptions& options, int threads,
@@ -259,7 +269,9 @@ class Run {
         writes_beside_(threads > 1),
         warnings_(warnings),
         units_(scene.output.units),
-        simulation_(std::move(setup), registry, make_logger(warnings)) {
+        simulation_(std::move(setup), registry, make_logger(warnings)),
+        accuracy_(scene.accuracy, simulation_.setup().time, simulation_.setup().remesh,
+                  depends_on_path(simulation_.setup())) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(),
                                simulation_.solver_name(),
@@ -280,10 +292,13 @@ class Run {
       spdlog::info("removed from {}: {} files of {}", directory_, count,
                    saved ? "the run that goes on, written after this state or at its end" : "an earlier run, and no others");
     is_saved_ = saved.has_value();
-    if (saved)
+    if (saved) {
       spdlog::info("going on after step {}", simulation_.steps());
-    else
+      accuracy_.go_on(read_file(std::filesystem::path(directory_) / "steps.jsonl").value_or(""));
+      if (accuracy_.is_asked()) simulation_.conditions().remesh.relative_tolerance = accuracy_.relative_tolerance();
+    } else {
       write(simulation_.report());
+    }
   }
 
   int run() {
@@ -313,6 +328,12 @@ class Run {
       for (const std::string& line :
            describe_errors(setup.fields.curves.empty() ? "" : output::stored_forces(directory_), writer_->totals(), units_))
         fmt::print("{}\n", line);
+    if (is_finished && accuracy_.is_asked())
+      fmt::print("{}\n",
+                 accuracy_.describe(setup.fields.curves.empty() ? "" : output::stored_forces(directory_),
+                                    setup.fields.points.empty()
+                                        ? ""
+                                        : read_file(std::filesystem::path(directory_) / output::kPointFile).value_or("")));
     if (const int count = writer_->warnings(); count > 0)
       spdlog::warn("{} warning{}: see above, or summary.json in {}", count, count == 1 ? "" : "s", directory_);
     if (with_report_) write_report();
@@ -389,6 +410,43 @@ class Run {
     std::_Exit(simulation_stopped);
   }
 
+  /// The largest kinetic, elastic and contact energy at the end of a step so far [J].
+  double largest_energy() {
+    const State<Dim>& state = simulation_.state();
+    const TimeOptions& time = simulation_.setup().time;
+    if (time.has_inertia() && !time.adaptive.enabled)
+      simulation_.observe([&](const FrameView<Dim>& frame) {
+        const EnergyReport& energy = simulation_.report().energy;
+        largest_energy_ = std::max(largest_energy_, energy.elastic + energy.contact + frame.asked->kinetic_energy.at(0));
+      });
+    return std::max({state.stored_energy, state.control.energy, largest_energy_});
+  }
+
+  /// Takes a step, and as long as its error bar asks for it, again on a finer mesh; from what was there, where that fails.
+  StepResult take_step() {
+    StepResult result = simulation_.advance();
+    if (!accuracy_.is_asked()) return result;
+    RemeshOptions& remesh = simulation_.conditions().remesh;
+    while (result.ok) {
+      const auto finer = accuracy_.finer(result.report, largest_energy(), simulation_.finished());
+      if (!finer) break;
+      const Snapshot<Dim> coarse = simulation_.save();
+      simulation_.restore(before_);
+      remesh.relative_tolerance = *finer;
+      StepResult again = simulation_.advance();
+      if (!again.ok) {
+        simulation_.restore(coarse);
+        break;
+      }
+      add_dropped(std::move(result.report), again.report);
+      result = std::move(again);
+    }
+    if (!result.ok) return result;
+    accuracy_.add(result.report, largest_energy());
+    remesh.relative_tolerance = accuracy_.relative_tolerance();
+    return result;
+  }
+
   /// Until the end or until something stops it; says what, and in `advice` what can be done. Only while it is in a step, the
   /// output is not `at_output`.
   std::string advance(std::unique_lock<std::mutex>& at_output, std::string& advice) {
@@ -399,7 +457,7 @@ class Run {
       const StepResult result = [&] {
         const Unlocked while_stepping(at_output);
         try {
-          return simulation_.advance();
+          return take_step();
         } catch (const InputError& error) {  // a value of the scene that is none at this time or place
           StepResult failed;
           failed.ok = false;
@@ -475,16 +533,18 @@ class Run {
   Warnings& warnings_;
   Units units_;  ///< of results
   Simulation<Dim> simulation_;
+  AccuracyWatch accuracy_;
   std::unique_ptr<output::Writer> writer_;
   std::optional<output::ProfileFile> profile_;
   double output_seconds_ = 0;
   double start_ = seconds_now();
   int steps_done_ = 0;
-  bool is_saved_ = false;    ///< whether the present state is
-  std::mutex output_;        ///< of the writer and of what is below
-  Snapshot<Dim> before_;     ///< the state that the step begins with
-  int frame_step_ = 0;       ///< of the frame that was written last, or is being written
-  std::future<void> frame_;  ///< being written
+  double largest_energy_ = 0;  ///< of steps whose lengths the scene sets [J]
+  bool is_saved_ = false;      ///< whether the present state is
+  std::mutex output_;          ///< of the writer and of what is below
+  Snapshot<Dim> before_;       ///< the state that the step begins with
+  int frame_step_ = 0;         ///< of the frame that was written last, or is being written
+  std::future<void> frame_;    ///< being written
 };
 
 /// Reads the scene anew where it asks for no defaults, with those that the run it goes on with had.
@@ -509,6 +569,7 @@ int run(const RunOptions& options) {
   if (options.resume) keep_defaults(directory, options, scene);
   Warnings warnings;
   for (const auto& warning : scene.warnings) warnings.add(warning);
+  for (const std::string& line : describe_accuracy(scene.accuracy)) spdlog::info("{}", line);
   if (!scene.defaults.information.empty()) spdlog::info("{}", scene.defaults.information);
   const int threads = options.threads >= 0 ? options.threads : scene.max_threads;
   const ThreadLimit limit(threads);
