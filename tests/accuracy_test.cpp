@@ -138,7 +138,16 @@ TEST(Accuracy, RunWithoutBarsOrWithStepsOfTheSceneSaysSo) {
   EXPECT_NE(run.describe("", "").find("without the error of the steps, as the scene sets /time/dt"), std::string::npos);
 }
 
+TEST(Accuracy, EasyStepsDoNotPutOffAFinerMesh) {
+  AccuracyWatch run = watch(0.01);
+  for (int i = 0; i < 50; ++i) run.add(step(1e-9), 1);
+  const auto finer = run.finer(step(0.1), 1, false);
+  ASSERT_TRUE(finer);
+  EXPECT_LT(*finer, kFirst);
+}
+
 TEST(Accuracy, ResumedRunKnowsTheStepsBefore) {
+  const Units units("mm", "t", "s");
   AccuracyWatch through = watch(0.01), resumed = watch(0.01);
   std::ostringstream log;
   double largest = 0;
@@ -148,11 +157,13 @@ TEST(Accuracy, ResumedRunKnowsTheStepsBefore) {
     through.finer(now, largest, false);
     const double used = through.relative_tolerance();
     through.add(now, largest);
-    log << R"({"step":)" << largest << R"(,"energy":{"elastic":)" << largest << R"(,"contact":0},"split_tolerance":)"
-        << kStoredFraction * used * 1.1 * largest << R"(,"bars":{"energy":{"mesh":)" << -error << "}}}\n";
+    const auto shown = [&](double value) { return units.from_si(value, "J"); };
+    log << R"({"step":)" << largest << R"(,"energy":{"elastic":)" << shown(largest)
+        << R"(,"contact":null},"split_tolerance":)" << shown(kStoredFraction * used * 1.1 * largest)
+        << R"(,"bars":{"energy":{"mesh":)" << shown(-error) << "}}}\n";
   }
   EXPECT_NE(through.relative_tolerance(), kFirst);
-  resumed.go_on(log.str());
+  resumed.go_on(log.str(), units);
   EXPECT_DOUBLE_EQ(resumed.relative_tolerance(), through.relative_tolerance());
   EXPECT_EQ(resumed.describe("", ""), through.describe("", ""));
 }

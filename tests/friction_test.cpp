@@ -93,6 +93,15 @@ TEST(Friction, CountsNoApproachAsSlip) {
   for (const double height : {kDhat - kGap, 1.0, 10.0})
     EXPECT_LE((force_after_fall(height, true) - force).norm(), 1e-12 * force.norm()) << height;
   EXPECT_GT((force_after_fall(1, false) - force).norm(), 0.5 * force.norm());
+
+  const auto force_after_slide = [&](bool slips_from_touch) {
+    VectorX reference = x;
+    for (Eigen::Index v = 3; v < 6; ++v) reference[2 * v] -= 10 * kDhat;
+    FrictionEnergy<2> friction;
+    friction.renew(contact, x, workspace, options, 20, reference, 0.01, slips_from_touch);
+    return gradient_of(friction, x);
+  };
+  EXPECT_EQ(force_after_slide(true), force_after_slide(false)) << "from beside";
 }
 
 TEST(Friction, RelaxedForcesLieOnTheLineBetweenTwo) {

@@ -48,7 +48,7 @@ bool wait_until(const Condition& condition) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(5);
   while (!condition()) {
     if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::microseconds(200));
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
   }
   return true;
 }
@@ -66,6 +66,7 @@ class Command {
     argv.push_back(nullptr);
     pid_ = fork();
     if (pid_ != 0) return;
+    setpriority(PRIO_PROCESS, 0, 10);  // a busy machine runs who watches it before it
     const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
     dup2(out, STDOUT_FILENO);
     dup2(out, STDERR_FILENO);

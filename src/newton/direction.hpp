@@ -7,6 +7,7 @@
 
 #include "convergence.hpp"
 #include "core/timer.hpp"
+#include "energy/arcs.hpp"
 
 namespace itr {
 
@@ -136,10 +137,11 @@ class Direction {
     const bool may_be_last = 0.1 * at_.gradient_norm() * std::max(left * left, asked) < convergence_.gradient_asked();
     return may_be_last ? kTightResidual : asked;
   }
-  /// Not while held dofs advance, nor in patches, nor with PolyFEM's way, nor where each further solve is an iterative one.
+  /// Not along arcs, while held dofs advance, in patches, where indefinite steps are taken as they are, nor where each
+  /// further solve is an iterative one.
   bool may_be_longer() const {
     return task_.options.indefinite == IndefiniteHessian::project && !task_.extras.is_brief && !held_.is_advancing() &&
-           task_.has_unknowns() && task_.system.sees_all_directions();
+           task_.has_unknowns() && task_.system.sees_all_directions() && !dynamic_cast<const Arcs*>(&task_.energy);
   }
   NewtonSystem::Product find_true_hessian() {
     if (is_projected_) assemble(PsdProjection::none);

@@ -6,7 +6,6 @@
 
 #include "core/timer.hpp"
 #include "direction.hpp"
-#include "energy/arcs.hpp"
 #include "lanczos.hpp"
 #include "search.hpp"
 
@@ -35,14 +34,21 @@ class KrylovModel {
   }
   /// Norm in P of the projected step.
   double shortest() const { return lanczos_.first_norm(); }
-  /// Finds the minimum within a radius, both in P.
+  /// Finds the minimum within a radius, both in P, of the vectors of which the right-hand side has more than round-off: that
+  /// would choose a side where a symmetric state is a saddle.
   void minimize(double radius) {
     constexpr int kMostHalvings = 60;
+    constexpr double kNothing = 1e-6;  // of the right-hand side
+    const auto has = [&](Eigen::Index i) { return std::abs(lanczos_.eigenvectors()(0, i)) > kNothing; };
     const VectorX& theta = lanczos_.eigenvalues();
     const VectorX b = shortest() * lanczos_.eigenvectors().row(0).transpose();
-    const auto of_shift = [&](double shift) -> VectorX { return b.cwiseQuotient((theta.array() + shift).matrix()); };
-    double low = std::max(0.0, -theta[0]), high = low + shortest() / radius;
-    if (theta[0] > 0 && of_shift(0).norm() <= radius) high = 0;
+    const auto of_shift = [&](double shift) -> VectorX {
+      return VectorX::NullaryExpr(b.size(), [&](Eigen::Index i) { return has(i) ? b[i] / (theta[i] + shift) : 0; });
+    };
+    Eigen::Index first = 0;
+    while (first + 1 < b.size() && !has(first)) ++first;
+    double low = std::max(0.0, -theta[first]), high = low + shortest() / radius;
+    if (theta[first] > 0 && of_shift(0).norm() <= radius) high = 0;
     for (int i = 0; i < kMostHalvings && high > low; ++i) {
       const double middle = 0.5 * (low + high);
       (of_shift(middle).norm() > radius ? low : high) = middle;
@@ -77,7 +83,7 @@ class LongStep {
   /// Moves along a longer step; false where there is none whose whole way is free and lowers the energy as the model says.
   bool take() {
     const NewtonSystem::Product& H = direction_.true_hessian();
-    if (!H || dynamic_cast<const Arcs*>(&task_.energy)) return false;
+    if (!H) return false;
     const NewtonSystem::Product P = task_.system.product();
     KrylovModel model(task_.system, H, P);
     {

@@ -206,7 +206,7 @@ class LaggedSolve {
         return has_changed = !std::equal(now.begin(), now.end(), forces.begin(), is_near);
       };
       const bool may_be_shorter = reach_ > kLeastReach && steps < kMostSteps;
-      loose_force_ = std::min(asked_of_round(1), std::isinf(reach_) ? kLooseForce : kProximalForce);
+      loose_force_ = std::isinf(reach_) ? asked_of_round(1) : std::min(asked_of_round(1), kProximalForce);
       NewtonSummary summary = minimize_lagged(x, std::exchange(step_to_start, {}),
                                               may_be_shorter ? changes : std::function<bool(const VectorX&)>());
       summary.add_effort(all);
@@ -219,6 +219,13 @@ class LaggedSolve {
         continue;
       }
       const bool is_last = !least_motion_->is_holding();
+      // A proximal step only chooses the way: where it fails, the way is that of one solve.
+      if (!all.converged() && !is_last && all.termination != Termination::cancelled) {
+        x = begin;
+        reach_ = kAnywhere;
+        steps = kMostSteps;
+        continue;
+      }
       Lagged next = lagged_;
       if (all.converged()) potential_.lag_friction(x, workspace_, next);
       if (!all.converged() ||

@@ -23,12 +23,19 @@ constexpr double kAgain = 1.25, kTooFine = 0.5;  ///< of what the mesh may be wr
 constexpr double kAimed = 0.7;                   ///< of it, by a coarser mesh
 constexpr int kMostTrials = 3;
 constexpr int kMostHalvings = 6, kMostDoublings = 2;  ///< of the tolerance, at once
+constexpr int kLeastHalvings = -4;                    ///< in all: of easy steps that follow each other
 constexpr double kUnresolved = 0.5;                   ///< of the energy: a larger bar tells nothing
 constexpr double kGrowsFast = 2;                      ///< the energy in a step
 constexpr double kHelps = 0.9;                        ///< of the error before, that of a finer mesh at most
 
 bool is_first_order(const TimeOptions& time) {
   return time.integrator == Integrator::implicit_euler || (time.integrator == Integrator::bdf && time.bdf_order == 1);
+}
+
+/// 0 where it is none: numbers that are not finite are null.
+double number(const Json& object, const std::string& key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : 0;
 }
 
 }  // namespace
@@ -43,7 +50,7 @@ AccuracyWatch::AccuracyWatch(const scene::Accuracy& asked, const TimeOptions& ti
 
 double AccuracyWatch::relative_tolerance() const { return std::ldexp(first_tolerance_, -halvings_); }
 
-void AccuracyWatch::go_on(const std::string& steps) {
+void AccuracyWatch::go_on(const std::string& steps, const Units& units) {
   is_resumed_ = true;
   if (time_.has_inertia()) return;
   std::istringstream lines(steps);
@@ -52,22 +59,27 @@ void AccuracyWatch::go_on(const std::string& steps) {
     const Json step = Json::parse(line, nullptr, false);
     if (!step.is_object() || step.value("step", 0) == 0) continue;
     StepReport report;
-    report.energy.contact = step["energy"].value("contact", 0.0);
-    stored = std::max(stored, step["energy"].value("elastic", 0.0) + report.energy.contact);
-    report.time_error = step.value("time_error", 0.0);
+    const auto joules = [&](const Json& object, std::string_view key) {
+      return units.to_si(number(object, std::string(key)), "J");
+    };
+    report.energy.contact = joules(step["energy"], "contact");
+    stored = std::max(stored, joules(step["energy"], "elastic") + report.energy.contact);
+    report.time_error = number(step, "time_error");
     const Json bars = step.value("bars", Json::object());
     report.errors.is_asked = !bars.empty();
     report.errors.no_bar = bars.value("no_bar", "");
     for (int s = 0; s < kErrorSources && bars.contains("energy"); ++s)
-      report.errors.energy[s] = bars["energy"].value(std::string(name(static_cast<ErrorSource>(s))), 0.0);
-    if (const double split = step.value("split_tolerance", 0.0); asked_.follows_bars && split > 0 && stored > 0)
+      report.errors.energy[s] = joules(bars["energy"], name(static_cast<ErrorSource>(s)));
+    if (const double split = joules(step, "split_tolerance"); asked_.follows_bars && split > 0 && stored > 0)
       halvings_ = static_cast<int>(std::lround(std::log2(first_tolerance_ * kStoredFraction * stored / split)));
     add(report, stored);
   }
 }
 
 double AccuracyWatch::mesh_error(const StepReport& report, double energy) const {
-  return energy > 0 ? std::abs(report.errors.energy[0]) / energy / (kMeshShare * asked_.value) : 0;
+  return energy > 0 ? std::abs(report.errors.energy[static_cast<std::size_t>(ErrorSource::mesh)]) / energy /
+                          (kMeshShare * asked_.value)
+                    : 0;
 }
 
 bool AccuracyWatch::is_steered(double energy, bool is_last) const {
@@ -96,7 +108,8 @@ void AccuracyWatch::add(const StepReport& report, double energy) {
   trials_ = 0;
   const double error = mesh_error(report, energy);
   if (is_steered(energy, false) && error > 0 && error < kTooFine)
-    halvings_ -= std::clamp(static_cast<int>(2 * std::log2(kAimed / error)), 0, kMostDoublings);
+    halvings_ =
+        std::max(halvings_ - std::clamp(static_cast<int>(2 * std::log2(kAimed / error)), 0, kMostDoublings), kLeastHalvings);
   has_contact_ = has_contact_ || report.energy.contact > 0;
   worst_chord_ = std::max(worst_chord_, report.time_error);
   time_sum_ += is_first_order(time_) ? report.time_error * std::sqrt(energy)  // of one sign

@@ -21,7 +21,7 @@ class AccuracyWatch {
 
   bool is_asked() const { return asked_.value > 0; }
   /// Goes on after the steps of this text of steps.jsonl. With inertia it knows nothing of them.
-  void go_on(const std::string& steps);
+  void go_on(const std::string& steps, const Units& units);
   /// The relative_tolerance with which a step is to be taken again, or none: it stands. `energy` [J]: the largest so far.
   /// Where that grows fast, errors of the early steps would rule, and only the `last` step is looked at.
   std::optional<double> finer(const StepReport& report, double energy, bool is_last);

@@ -255,7 +255,7 @@ class Unlocked {
 
 template <int Dim>
 bool depends_on_path(const Setup<Dim>& setup) {
-  return setup.contact.has_friction() || !setup.damping.empty() ||
+  return setup.contact.has_friction() || setup.contact.adhesion.tangential_coefficient > 0 || !setup.damping.empty() ||
          std::ranges::any_of(setup.materials, [](const auto& entry) { return !entry.second.prony.empty(); });
 }
 
@@ -294,8 +294,11 @@ class Run {
     is_saved_ = saved.has_value();
     if (saved) {
       spdlog::info("going on after step {}", simulation_.steps());
-      accuracy_.go_on(read_file(std::filesystem::path(directory_) / "steps.jsonl").value_or(""));
-      if (accuracy_.is_asked()) simulation_.conditions().remesh.relative_tolerance = accuracy_.relative_tolerance();
+      if (accuracy_.is_asked()) {
+        accuracy_.go_on(read_file(std::filesystem::path(directory_) / "steps.jsonl").value_or(""),
+                        simulation_.setup().units);
+        simulation_.conditions().remesh.relative_tolerance = accuracy_.relative_tolerance();
+      }
     } else {
       write(simulation_.report());
     }

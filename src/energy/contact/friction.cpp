@@ -146,8 +146,11 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .kinetic = kinetic / statics};
     pair.force = lets_go_ ? held * s.weight * options.adhesion.lagged_pull()
                           : statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
-    if (slips_from_touch)
-      pair.approach = approach_of(pair, contact.distance(s, velocity_reference).separation.normalized(), options.dhat);
+    if (slips_from_touch) {
+      constexpr double kTogether = 0.5;  // cosine: what slides past turns its normal by more
+      const Vec<Dim> before = contact.distance(s, velocity_reference).separation.normalized();
+      if (before.dot(q.separation) > kTogether * distance) pair.approach = approach_of(pair, before, options.dhat);
+    }
     pairs_.push_back(pair);
   }
 }
