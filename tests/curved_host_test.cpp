@@ -303,7 +303,7 @@ TEST(CurvedHost, TheFirstRetryKeepsCurvesElsewhere) {
 /// The densities of output are the energy of the report, also where the barrier acts.
 TEST(CurvedHost, DensitiesOfDistortedCellsSumUpToTheElasticEnergy) {
   auto setup = hitting_block();
-  setup.initial_velocity[0].value = [](const Vec<2>&, double) { return Vec<2>(0, -1200); };
+  setup.initial_velocity[0].value = [](const Vec<2>&, double) { return Vec<2>(0, -1000); };
   auto simulation = simulate(setup);
   int acting = 0;
   for (int i = 0; i < 6; ++i) {

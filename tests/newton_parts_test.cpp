@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "double_well.hpp"
-#include "newton/long_step.hpp"
 #include "newton/saddle.hpp"
 
 namespace itr {
@@ -38,7 +37,6 @@ class Recording final : public NewtonSystem {
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override {
     return exact_.solve_again(rhs, solution);
   }
-  Product product() const override { return exact_.product(); }
   std::string message() const override { return "recording"; }
   double diagonal_scale() const override { return exact_.diagonal_scale(); }
   double curvature_of(const Shift& shift, ConstVectorView step) const override { return exact_.curvature_of(shift, step); }
@@ -309,8 +307,7 @@ TEST(Direction, IsProjectedForSomeIterationsWhereTheTrueHessianIsIndefinite) {
   Parts parts(energy, Vec<2>(0.1, 0.1), options);
   using enum PsdProjection;
   for (int i = 0; i < 4; ++i) ASSERT_TRUE(parts.direction->find());
-  // The true Hessian is assembled beside the projected one, for longer steps, but factorised only where it is tried.
-  EXPECT_EQ(parts.system.projections, (std::vector{none, clamp, none, clamp, none, clamp, none, clamp}));
+  EXPECT_EQ(parts.system.projections, (std::vector{none, clamp, clamp, clamp, none, clamp}));
   EXPECT_EQ(parts.direction->indefinite(), 2);
 }
 
@@ -412,54 +409,6 @@ TEST(Search, PutsHeldDofsExactlyAtTheirTargets) {
   ASSERT_TRUE(parts.direction->find());
   ASSERT_TRUE(parts.search->along(parts.direction->step()));
   EXPECT_EQ(parts.x[1], 0.7);
-}
-
-/// Beside a saddle, with c of DoubleWell far below the 1 of its projected Hessian.
-TEST(LongStep, GoesFartherThanTheProjectedStepWhereTheEnergyFallsAsTheModelSays) {
-  const DoubleWell energy(1e-2);
-  const VectorX start = Vec<2>(1e-3, 0);
-  Parts parts(energy, start);
-  ASSERT_TRUE(parts.direction->find());
-  const double projected = parts.direction->step().norm, before = parts.at->value();
-  EXPECT_NEAR(projected, 1e-5, 1e-8);
-  LongStep step(*parts.task, *parts.at, *parts.direction, *parts.search);
-  ASSERT_TRUE(step.take());
-  EXPECT_GT((parts.x - start).norm(), 7 * projected) << "one doubling of 4 times the projected step";
-  EXPECT_LT(parts.at->value(), before);
-  EXPECT_NEAR(parts.x[0], 0.1, 0.05) << "the minimum";
-}
-
-TEST(LongStep, LeavesTheStepAsItIsWhereTheWayIsNotFree) {
-  const VectorX start = Vec<2>(1e-3, 0);
-  const DoubleWell energy(1e-2, 0, 1e-3 + 1e-6);
-  Parts parts(energy, start);
-  ASSERT_TRUE(parts.direction->find());
-  const VectorX projected = parts.direction->step().direction;
-  LongStep step(*parts.task, *parts.at, *parts.direction, *parts.search);
-  EXPECT_FALSE(step.take());
-  EXPECT_EQ(parts.x, start);
-  EXPECT_EQ(VectorX(parts.direction->step().direction), projected);
-}
-
-/// Where the projected Hessian is the true one, the Krylov space has the minimum at once.
-TEST(LongStep, IsNoneOfTheTrueHessianAndEndsTheProjectionWhereTheModelIsConvex) {
-  const DoubleWell energy(1);
-  NewtonOptions options;
-  options.projected_iterations = 3;
-  Parts convex(energy, Vec<2>(1.1, 1.2), options);
-  ASSERT_TRUE(convex.direction->find());
-  LongStep none(*convex.task, *convex.at, *convex.direction, *convex.search);
-  EXPECT_FALSE(none.take());
-  Parts parts(energy, Vec<2>(0.1, 0.1), options);
-  ASSERT_TRUE(parts.direction->find());
-  parts.at->move_to(Vec<2>(1.1, 1.2), energy.value(Vec<2>(1.1, 1.2), parts.workspace));
-  parts.begin(1);
-  ASSERT_TRUE(parts.direction->find());
-  ASSERT_TRUE(LongStep(*parts.task, *parts.at, *parts.direction, *parts.search).take());
-  parts.begin(2);
-  parts.system.projections.clear();
-  ASSERT_TRUE(parts.direction->find());
-  EXPECT_EQ(parts.system.projections, (std::vector{PsdProjection::none}));
 }
 
 TEST(Saddle, IsLeftDownwards) {

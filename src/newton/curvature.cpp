@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "curvature.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include "core/noise.hpp"
-#include "lanczos.hpp"
 
 namespace itr {
 
@@ -24,6 +24,74 @@ VectorX vector_of_noise(int unknowns) {
   return VectorX::NullaryExpr(unknowns, [](Eigen::Index i) { return noise(static_cast<std::uint64_t>(i)); }).normalized();
 }
 
+bool has_solved(const linear::SolveReport& report) {
+  return report.outcome == linear::Outcome::ok || report.outcome == linear::Outcome::not_converged;
+}
+
+/// Lanczos' method for the least theta of H v = theta P v, with all vectors kept orthogonal.
+class Lanczos {
+ public:
+  Lanczos(NewtonSystem& system, const NewtonSystem::Product& H, const NewtonSystem::Product& P)
+      : system_(system), H_(H), P_(P) {}
+
+  /// Begins with P^-1 start, which has more of soft modes.
+  bool begin(const VectorX& start) {
+    next_.resize(start.size());
+    return has_solved(system_.solve_again(start, next_)) && append();
+  }
+  /// One vector more. False where there is none, or where a solve fails.
+  bool extend() {
+    VectorX Hv(next_.size());
+    H_(vectors_.back(), Hv);
+    alpha_.push_back(vectors_.back().dot(Hv));
+    next_.setZero();
+    if (!has_solved(system_.solve_again(Hv, next_))) return false;
+    for (int round = 0; round < 2; ++round)
+      for (std::size_t i = 0; i < vectors_.size(); ++i) next_ -= images_[i].dot(next_) * vectors_[i];
+    analyze();
+    return append();
+  }
+  double least() const { return least_; }
+  /// By how much an eigenvalue may differ from it.
+  double uncertainty() const { return beta_.empty() ? 1 : std::abs(beta_.back() * ritz_[ritz_.size() - 1]); }
+  VectorX eigenvector() const {
+    VectorX v = VectorX::Zero(next_.size());
+    for (Eigen::Index i = 0; i < ritz_.size(); ++i) v += ritz_[i] * vectors_[i];
+    return v.normalized();
+  }
+
+ private:
+  bool append() {
+    VectorX image(next_.size());
+    P_(next_, image);
+    const double norm = std::sqrt(std::max(0.0, next_.dot(image)));
+    if (!vectors_.empty()) beta_.push_back(norm);
+    if (!(norm > (vectors_.empty() ? 0 : kExhausted))) return false;
+    vectors_.push_back(next_ / norm);
+    images_.push_back(image / norm);
+    return true;
+  }
+
+  void analyze() {
+    const auto n = static_cast<Eigen::Index>(alpha_.size());
+    Eigen::SelfAdjointEigenSolver<MatrixX> solver;
+    const VectorX diagonal = Eigen::Map<const VectorX>(alpha_.data(), n),
+                  off = Eigen::Map<const VectorX>(beta_.data(), n - 1);
+    solver.computeFromTridiagonal(diagonal, off);
+    least_ = solver.eigenvalues()[0];
+    ritz_ = solver.eigenvectors().col(0);
+  }
+
+  static constexpr double kExhausted = 1e-7;  // of vectors whose norm is 1: what is left is round-off of the solves
+
+  NewtonSystem& system_;
+  const NewtonSystem::Product &H_, &P_;
+  VectorX next_, ritz_;
+  std::vector<VectorX> vectors_, images_;  ///< orthonormal in P, and P times them
+  std::vector<double> alpha_, beta_;
+  double least_ = 1;
+};
+
 }  // namespace
 
 double find_negative_curvature(NewtonSystem& system, int unknowns, VectorX& v) {
@@ -40,7 +108,8 @@ double find_negative_curvature(NewtonSystem& system, int unknowns, VectorX& v) {
   VectorX next(unknowns);
   double curvature = 0;
   for (int k = 0; k < kMostSolves; ++k) {
-    if (!has_solved(system.solve_again(v, next))) return 0;
+    const auto outcome = system.solve_again(v, next).outcome;
+    if (outcome != linear::Outcome::ok && outcome != linear::Outcome::not_converged) return 0;
     const double before = curvature;
     curvature = next.dot(v) / next.squaredNorm() - shift;  // (H + shift) next = v
     v = next.normalized();
@@ -85,7 +154,7 @@ std::optional<double> find_negative_curvature_by_products(NewtonSystem& system,
     if (least < kNegative ? off < -kSettled * least : off < kCertain * least) break;
   }
   if (!(lanczos.least() < kNegative)) return 0;
-  v = lanczos.sum_of(lanczos.eigenvectors().col(0)).normalized();
+  v = lanczos.eigenvector();
   if (v.dot(vector_without_symmetry(unknowns)) < 0) v = -v;
   H(v, Hv);
   return v.dot(Hv);

@@ -7,7 +7,6 @@
 
 #include "convergence.hpp"
 #include "core/timer.hpp"
-#include "energy/arcs.hpp"
 
 namespace itr {
 
@@ -39,14 +38,11 @@ class Direction {
     is_projected_ =
         options.project_to_psd && (projected_iterations_ > 0 || options.projected_iterations == 0 || !may_be_true);
     if (projected_iterations_ > 0) --projected_iterations_;
-    true_hessian_ = {};
     if (!is_projected_ && find_with(PsdProjection::none)) return true;
     if (options.project_to_psd) {
-      if (may_be_longer()) true_hessian_ = find_true_hessian();
       if (!is_projected_) projected_iterations_ = options.projected_iterations - 1;
       is_projected_ = true;
       if (find_with(PsdProjection::clamp)) return true;
-      true_hessian_ = {};
     }
     for (int attempt = 0; attempt < kMostFractions && is_curable(solved_.outcome); ++attempt)
       if (solve(Shift::fraction_of_diagonal(kFirstFraction * std::pow(10, attempt)))) return true;
@@ -58,7 +54,6 @@ class Direction {
   /// The step of the projected Hessian, once the one of the true Hessian has led nowhere. False if it has been tried.
   bool find_projected() {
     if (is_projected_ || !task_.options.project_to_psd) return false;
-    true_hessian_ = {};
     projected_iterations_ = task_.options.projected_iterations - 1;
     is_projected_ = true;
     return find_with(PsdProjection::clamp);
@@ -71,21 +66,6 @@ class Direction {
     if (!is_projected_ && shift_.value == 0) note_definiteness();
     return found || find();
   }
-
-  /// The true Hessian at x where the step is of the projected one, whose factor is there, and may become a longer one; else
-  /// null.
-  const NewtonSystem::Product& true_hessian() const { return true_hessian_; }
-  /// Right-hand side of the system, over the unknowns.
-  ConstVectorView right_hand_side() {
-    VectorView rhs = scratch_.rhs.resize(task_.dofs.num_unknowns);
-    rhs.setZero();
-    if (held_.motion().coupling.size() > 0) rhs -= held_.motion().coupling;
-    for (Eigen::Index i = 0; i < at_.x().size(); ++i)
-      if (task_.dofs.unknown[i] != kNone) rhs[task_.dofs.unknown[i]] -= at_.gradient()[i];
-    return rhs;
-  }
-  /// Tries the true Hessian in the next iteration.
-  void end_projection() { projected_iterations_ = 0; }
 
   Step& step() { return step_; }
   const Step& step() const { return step_; }
@@ -136,16 +116,6 @@ class Direction {
     const double asked = std::clamp(0.1 * left * left, kTightResidual, kLoosest);
     const bool may_be_last = 0.1 * at_.gradient_norm() * std::max(left * left, asked) < convergence_.gradient_asked();
     return may_be_last ? kTightResidual : asked;
-  }
-  /// Not along arcs, while held dofs advance, in patches, where indefinite steps are taken as they are, nor where each
-  /// further solve is an iterative one.
-  bool may_be_longer() const {
-    return task_.options.indefinite == IndefiniteHessian::project && !task_.extras.is_brief && !held_.is_advancing() &&
-           task_.has_unknowns() && task_.system.sees_all_directions() && !dynamic_cast<const Arcs*>(&task_.energy);
-  }
-  NewtonSystem::Product find_true_hessian() {
-    if (is_projected_) assemble(PsdProjection::none);
-    return task_.system.product();
   }
   bool find_with(PsdProjection psd) {
     assemble(psd);
@@ -204,6 +174,14 @@ class Direction {
     else
       step_.direction.setZero();
   }
+  ConstVectorView right_hand_side() {
+    VectorView rhs = scratch_.rhs.resize(task_.dofs.num_unknowns);
+    rhs.setZero();
+    if (held_.motion().coupling.size() > 0) rhs -= held_.motion().coupling;
+    for (Eigen::Index i = 0; i < at_.x().size(); ++i)
+      if (task_.dofs.unknown[i] != kNone) rhs[task_.dofs.unknown[i]] -= at_.gradient()[i];
+    return rhs;
+  }
   /// Records whether the true Hessian at x is indefinite. It has to be the last matrix that was solved with.
   void note_definiteness() {
     was_indefinite_ = solved_.definiteness == linear::Definiteness::indefinite;
@@ -229,10 +207,9 @@ class Direction {
   linear::SystemReport solved_;  ///< the last system
   std::string failure_;          ///< why the last one failed that did
 
-  bool is_projected_ = false;           ///< the step is of the projected Hessian
-  NewtonSystem::Product true_hessian_;  ///< null where the step may not become longer
-  int projected_iterations_ = 0;        ///< that are still to come before the true one is tried again
-  Shift shift_;                         ///< of the step's Hessian
+  bool is_projected_ = false;     ///< the step is of the projected Hessian
+  int projected_iterations_ = 0;  ///< that are still to come before the true one is tried again
+  Shift shift_;                   ///< of the step's Hessian
 
   double asked_ = kTightResidual;  ///< residual of the step
   double gradient_before_ = 0;     ///< norm, when the step before was asked for

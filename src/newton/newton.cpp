@@ -5,7 +5,6 @@
 #include <sstream>
 #include <string_view>
 
-#include "long_step.hpp"
 #include "saddle.hpp"
 
 namespace itr {
@@ -70,10 +69,9 @@ class Minimizer {
     return !direction_.is_loose() || !convergence_.is_near(direction_.step()) || direction_.tighten();
   }
 
-  /// A longer step comes first where the step is projected. A failed search along a loose direction, then one along the true
-  /// Newton direction, is tried once more along a better one.
+  /// A failed search along a loose direction, then one along the true Newton direction, is tried once more along a better
+  /// one.
   bool search() {
-    if (long_step_.take()) return true;
     Step& step = direction_.step();
     return search_.along(step) || (direction_.is_loose() && direction_.tighten() && search_.along(step)) ||
            (direction_.find_projected() && search_.along(step));
@@ -141,7 +139,6 @@ class Minimizer {
   Convergence convergence_{task_, at_, held_};
   Direction direction_{task_, at_, held_, convergence_};
   Search search_{task_, at_, held_};
-  LongStep long_step_{task_, at_, direction_, search_};
   Saddle saddle_{task_, at_, direction_, search_};
 };
 

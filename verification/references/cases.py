@@ -119,10 +119,7 @@ class Change:
 
 PLANNED: list[Change] = [
     Change("CCD sees more pairs that pass each other", ("cubes",), ("frames", "states", "reports"), energy=1e-6, counts=0.05,
-           positions=1e-6),
-    Change("projected steps are longer where the true Hessian lets them",
-           ("ball-wall", "ball-wall-two-threads", "ball-wall-resumed", "ball-wall-order-2", "drop", "cubes*"),
-           ("frames", "states", "reports"), energy=3e-6, counts=0.12, positions=1e-5)]
+           positions=1e-6)]
 
 
 def planned(name):
