@@ -18,12 +18,7 @@ ITR = sys.argv.pop()
 class Runs(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.folder = pathlib.Path(cls.temporary.name)
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.temporary.cleanup()
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
 
     def run_drop(self, name, time, more=(), flags=(), status=0):
         """A tilted square falls on a line."""

@@ -4,9 +4,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <random>
 
+#include "curved_mesh.hpp"
+#include "derivatives.hpp"
 #include "energy/least_motion.hpp"
 #include "itr/solver.hpp"
 #include "random_tets.hpp"
@@ -314,6 +318,49 @@ TEST(LooseBodies, AreFoundByTheRankOfTheirConditions) {
   EXPECT_FALSE(is_loose({1, 3, 0})) << "rollers and a point";
   EXPECT_TRUE(is_loose({0, 2, 4})) << "all of one component on a line along it";
   EXPECT_FALSE(is_loose({0, 1, 2, 3}));
+}
+
+/// Holds them where they are, as the force that acts on them would carry them by a fiftieth of their size.
+template <int Dim>
+void expect_hold_derivatives(const Mesh<Dim>& mesh) {
+  const CellSet<Dim> cells = whole_mesh(mesh, {});
+  VectorX rest(Dim * mesh.node_slots());
+  for (VertexId v = 0; v < mesh.node_slots(); ++v) rest.template segment<Dim>(Dim * v) = mesh.rest(v);
+  const DofMap dofs = all_free(rest.size());
+  LeastMotion<Dim> term(cells, find_loose_parts<Dim>(cells, rest, std::vector<char>(rest.size(), 0), {{1, {}}}), 0.5);
+  const VectorX force = VectorX::Constant(rest.size(), 3);
+  term.follow(force, force, dofs);
+  EXPECT_FALSE(term.is_holding());
+  EXPECT_EQ(gradient_of(term, rest).norm(), 0);
+  term.hold(rest, 0.02);
+  EXPECT_TRUE(term.is_holding());
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise(0, 0.1);
+  const VectorX x = rest + VectorX::NullaryExpr(rest.size(), [&] { return noise(random); });
+  const VectorX gradient = gradient_of(term, x);
+  VectorX plus, minus, difference(x.size());
+  Workspace workspace;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    plus = minus = x;
+    plus[i] += 1e-4;
+    minus[i] -= 1e-4;
+    difference[i] = (term.value(plus, workspace) - term.value(minus, workspace)) / 2e-4;
+  }
+  EXPECT_LE((difference - gradient).norm(), 1e-7 * gradient.norm());
+  // The Hessian has the stiffness of steps of least motion, too.
+  const LoosePart<Dim>& part = term.parts()[0];
+  const VectorX curved = hessian_of(term, x, PsdProjection::none) * (x - rest);
+  EXPECT_LE((curved - part.curvature() / part.hold * gradient).norm(), 1e-12 * curved.norm());
+  EXPECT_GT(part.curvature(), part.hold);
+  term.hold(rest, std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(term.is_holding());
+}
+
+TEST(LooseBodies, AreHeldByTheDerivativesOfAnEnergy) {
+  expect_hold_derivatives<2>(make_square(2, 0.2));
+  expect_hold_derivatives<2>(of_orders(make_square(2, 0.2), {{1, 2}}));
+  expect_hold_derivatives<3>(make_cubes(
+      2, [](int i, int j, int k) { return Vec<3>(i, 2 * j, k + 0.3 * i); }, [](int, int, int) { return 1; }));
 }
 
 TEST(LooseBodies, AreConnectedPartsIn3D) {

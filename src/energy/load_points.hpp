@@ -7,6 +7,7 @@
 #include <array>
 
 #include "energy/load.hpp"
+#include "geometry/facet_area.hpp"
 #include "geometry/measures.hpp"
 
 namespace itr {
@@ -21,9 +22,6 @@ struct LoadPoint {
     return kFar * sum + (kNear - kFar) * values[point];
   }
 };
-
-inline double facet_area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
-inline double facet_area(const std::array<Vec<3>, 3>& p) { return 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm(); }
 
 /// Calls visit(point, force) with the fraction of the total `weight * load` that acts at each point of a cell or a facet of
 /// a connected part.

@@ -10,10 +10,10 @@
 #include <set>
 #include <utility>
 
-#include "energy/load_points.hpp"
 #include "fem/locator.hpp"
 #include "fem/quadratic.hpp"
 #include "fem/quadrature.hpp"
+#include "geometry/facet_area.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/closed_faces.hpp"
 

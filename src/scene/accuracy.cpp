@@ -146,7 +146,11 @@ template <int Dim>
 void apply_accuracy(const Node& root, Accuracy& accuracy, Setup<Dim>& setup) {
   if (accuracy.value == 0) return;
   check_goal(root, accuracy.of, setup);
-  if (setup.time.has_inertia() && !setup.time.adaptive.enabled) setup.fields.kinetic_energy = true;  // errors are by it
+  if (setup.time.has_inertia() && !setup.time.adaptive.enabled && !setup.fields.kinetic_energy) {
+    setup.fields.kinetic_energy = true;
+    accuracy.derived.push_back(
+        {"/output/paraview/options/kinetic_energy", "true", "errors are parts of the largest energy"});
+  }
   setup.validate();
   Setup<Dim> chosen = setup;
   if (setup.time.adaptive.enabled)  // d-hat goes with what the first 20 steps prescribe: here that is a fifth of the run

@@ -189,7 +189,7 @@ class LaggedSolve {
   /// `change` times as large or small, the way is taken again by proximal steps (Rockafellar 1976), each with friction
   /// lagged where it begins: as bodies move in thick oil.
   NewtonSummary minimize_first(VectorX& x, VectorX step_to_start) {
-    loose_force_ = asked_of_round(1);
+    loose_force_ = asked_of_round(1);  // of proximal steps less
     if (!least_motion_ || !potential_.has_friction()) return minimize_lagged(x, std::move(step_to_start));
     constexpr int kMostSteps = 400, kMostAtTheEnd = 20;
     constexpr double kLeastReach = 1e-3, kGrowth = 4, kLargestReach = 1;
