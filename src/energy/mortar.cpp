@@ -13,9 +13,9 @@
 #include "fem/locator.hpp"
 #include "fem/quadratic.hpp"
 #include "fem/quadrature.hpp"
-#include "geometry/facet_area.hpp"
 #include "geometry/bvh.hpp"
 #include "geometry/closed_faces.hpp"
+#include "geometry/facet_area.hpp"
 
 namespace itr {
 
