@@ -49,6 +49,7 @@ TermFactory<2> push(const Vec<2>& force) {
 TrialScene scene_of_all_terms() {
   TrialScene scene(1, 6, {.friction = true, .pressure = true, .damping = true});
   scene.context.contact.dhat = 0.1;  // to the obstacle and beyond
+  scene.context.contact.average_gaps = true;
   scene.context.contact.adhesion = {.strength = 1, .peak = 0.05, .reach = 0.1, .tangential_coefficient = 0.3};
   scene.context.host.push_back(push({1, 0}));
   scene.context.loads.cavities = {{{3}, 0.5, 1, 1.4, 0}};
@@ -89,7 +90,15 @@ std::multimap<TermKind, double> summed_terms(const TrialScene& scene) {
     for (const int v : facet.vertices) counts[v] = 1;
   }
   for (const auto& [a, b] : obstacles.edges) edges.push_back({bodies + a, bodies + b});
-  const CollisionSurface surface = make_collision_surface<2>(edges, {}, {}, cells.rest, counts);
+  CollisionSurface surface = make_collision_surface<2>(edges, {}, {}, cells.rest, counts);
+  if (context.contact.average_gaps) {
+    const std::size_t n = cells.rest.size();
+    surface.retraction = std::make_shared<Retraction>(Retraction{.depth = std::vector<double>(n, 0),
+                                                                 .width = std::vector<double>(n, 0),
+                                                                 .is_corner = std::vector<char>(n, 1),
+                                                                 .rest = cells.rest,
+                                                                 .stiffness = 1});
+  }
   const VectorX x = with_obstacles(scene.fields.x, obstacles.x);
   const VectorX predictor = with_obstacles(scene.fields.predictor, obstacles.x);
   const VectorX reference = with_obstacles(scene.fields.velocity_reference, obstacles.velocity_reference);
@@ -116,6 +125,7 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
       {TermKind::host, [](auto& c) { c.host.clear(); }},
       {TermKind::follower, [](auto& c) { c.follower = nullptr; }},
       {TermKind::contact, [](auto& c) { c.contact.enabled = false; }},
+      {TermKind::averaged_contact, [](auto& c) { c.contact.average_gaps = false; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_coefficient = 0; }},
       {TermKind::friction, [](auto& c) { c.contact.friction_iterations = 0; }},
       {TermKind::adhesion, [](auto& c) { c.contact.adhesion.strength = 0; }},

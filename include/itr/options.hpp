@@ -140,7 +140,10 @@ struct ContactOptions {
   /// Surfaces that touch or overlap at the start are pushed apart: a run begins at the equilibrium of the interference, at
   /// rest and without loads (docs/theory.md, "Press fits").
   bool resolve_overlap = false;
-  double dhat = 1e-3;                ///< [m]: the barrier acts below it; 0: as Setup::choose_defaults says
+  double dhat = 1e-3;  ///< [m]: the barrier acts below it; 0: as Setup::choose_defaults says
+  /// Gaps are averaged over coarse smooth surfaces in 2D, which slide then (docs/theory.md, "Averaged gaps").
+  bool average_gaps = false;
+  bool may_average_gaps = false;     ///< Setup::choose_defaults sets average_gaps where bodies slide that conditions hold
   bool convergent = false;           ///< area weights, duplicate-region correction, 1/dhat^3: kappa is a pressure [Pa]
   double barrier_stiffness = 0;      ///< kappa; 0: as Setup::choose_defaults says
   bool adaptive_stiffness = false;   ///< from barrier_stiffness on as docs/theory.md, "Barrier stiffness", says

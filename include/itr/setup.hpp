@@ -36,6 +36,8 @@ struct Obstacles {
   std::vector<int> flats{};
 };
 
+struct Retraction;  // opaque
+
 /// A surface that collides in place of the bodies' boundary. Its vertices are displaced by `weights` times the displacements
 /// of the mesh's vertices.
 template <int Dim>
@@ -44,6 +46,7 @@ struct CollisionProxy {
   std::vector<std::array<int, 2>> edges;                 ///< 2D: surface edges; 3D: edges of faces and codimensional edges
   std::vector<std::array<int, 3>> triangles;             ///< 3D only
   Eigen::SparseMatrix<double, Eigen::RowMajor> weights;  ///< a row for each of its vertices, a column for each of the mesh's
+  std::shared_ptr<const Retraction> retraction{};        ///< where gaps are averaged
 };
 
 /// A displacement prescribed at the vertices of the boundary facets with a tag, and at vertices with this tag. The tag of a

@@ -79,6 +79,8 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
     cavities_.push_back(std::make_shared<CavityEnergy<Dim>>(cells_, cavity, terms.scaling));
   map_.reset();
   contact_of_cells_.reset();
+  averaged_.reset();
+  averaged_of_cells_.reset();
   adhesion_.reset();
   adhesion_of_cells_.reset();
   if (contact_) spare_contact_ = std::move(contact_);
@@ -98,6 +100,10 @@ void IncrementalPotential<Dim>::add_contact(const CollisionSurface& surface, dou
     contact_ = std::make_shared<ContactEnergy<Dim>>(surface, terms_->contact, stiffness, terms_->scaling);
   }
   contact_of_cells_ = of_cells(contact_);
+  if (surface.retraction) {
+    averaged_ = std::make_shared<AveragedContact>(surface, terms_->scaling);
+    averaged_of_cells_ = of_cells(averaged_);
+  }
   if (!is_in(TermKind::adhesion, *terms_)) return;
   adhesion_ = std::make_shared<AdhesionEnergy<Dim>>(surface, terms_->contact, adhesion_scaling());
   adhesion_of_cells_ = of_cells(adhesion_);
@@ -130,6 +136,8 @@ void IncrementalPotential<Dim>::lag_friction(ConstVectorView x, Workspace& works
     lag(on_surface(x), on_surface(velocity_reference_.view()));
   else
     lag(x, velocity_reference_.view());
+  if constexpr (Dim == 2)
+    if (averaged_) friction->add(averaged_->pressed_points(on_surface(x), workspace), terms_->contact.friction_coefficient);
   if (friction->empty()) return;
   lagged.friction_of_surface = friction;
   lagged.friction = of_cells(friction);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/scratch_vector.hpp"
+#include "energy/contact/averaged_contact.hpp"
 #include "energy/contact/contact.hpp"
 #include "energy/contact/friction.hpp"
 #include "energy/damping.hpp"
@@ -67,6 +68,7 @@ class IncrementalPotential {
     for (const auto& term : host_) visit(TermKind::host, term);
     for (const auto& term : lagged.follower) visit(TermKind::follower, term);
     visit(TermKind::contact, contact_of_cells_);
+    visit(TermKind::averaged_contact, averaged_of_cells_);
     visit(TermKind::adhesion, adhesion_of_cells_);
     visit(TermKind::friction, lagged.friction);
     visit(TermKind::adhesive_friction, lagged.adhesive_friction);
@@ -110,6 +112,8 @@ class IncrementalPotential {
   std::vector<std::shared_ptr<const Energy>> cavities_;
   std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed
   std::shared_ptr<const Energy> contact_of_cells_;
+  std::shared_ptr<AveragedContact> averaged_;  ///< over the surface's vertices
+  std::shared_ptr<const Energy> averaged_of_cells_;
   std::shared_ptr<AdhesionEnergy<Dim>> adhesion_;  ///< over the surface's vertices
   std::shared_ptr<const Energy> adhesion_of_cells_;
   std::vector<std::shared_ptr<const Energy>> host_;

@@ -54,6 +54,7 @@ enum class TermKind {
   host,
   follower,
   contact,
+  averaged_contact,
   adhesion,
   friction,
   adhesive_friction,
@@ -63,7 +64,7 @@ enum class TermKind {
   damping,
   contact_damping
 };
-inline constexpr std::size_t kNumTermKinds = 15;
+inline constexpr std::size_t kNumTermKinds = 16;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -161,6 +162,15 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
      .in_predictions = InPredictions::left_out,
      .is_bounded = [](const PotentialTerms<Dim>&) { return true; },
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },  // the surface is its own
+     .is_between_bodies = true,
+     .is_stored = true},
+    {.kind = TermKind::averaged_contact,
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.contact.enabled && terms.contact.average_gaps; },
+     .energy = EnergyEntry::contact,
+     .force = ForceEntry::contact,
+     .in_predictions = InPredictions::left_out,
+     .is_bounded = [](const PotentialTerms<Dim>&) { return true; },
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .is_between_bodies = true,
      .is_stored = true},
     {.kind = TermKind::adhesion,

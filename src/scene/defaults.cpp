@@ -24,6 +24,7 @@ bool has_friction(const Node& root) {
   return has_contact(root) &&
          (contact["friction_coefficient"].non_negative(0) > 0 || !contact["friction_pairs"].items().empty());
 }
+bool slides_without_inertia(const Node& root) { return has_friction(root) && !is_dynamic(root); }
 bool has_open_stiffness(const Node& root) {
   return has_contact(root) && !root["solver"]["contact"].has("initial_barrier_stiffness");
 }
@@ -38,6 +39,7 @@ constexpr Default kItrDefaults[] = {
     {"/time/step_cuts", "4", has_time, "a step that fails, or in which friction does not settle, is taken in parts"},
     {"/contact/dhat", "\"auto\"", has_contact, "surfaces stand off by little beside thicknesses, gaps and motions"},
     {"/contact/use_convergent_formulation", "true", has_contact, "contact converges with the mesh"},
+    {"/contact/average_gaps", "\"auto\"", slides_without_inertia, "coarse surfaces slide as smooth ones do"},
     {"/contact/epsv", "\"auto\"", has_friction, "what sticks hardly creeps, in any unit of time and number of steps"},
     {"/solver/contact/barrier_stiffness", "\"auto\"", has_open_stiffness, "suits the bodies, and is the same in each step"},
     {"/solver/contact/friction_iterations", "-1", has_friction, "friction is of the contact forces of its own step"},

@@ -41,6 +41,10 @@ const std::map<std::string, void (*)(const Node&)> kChecks = {
      }},
     {"consistent", [](const Node& node) { node.choice({"consistent"}, 0); }},
     {"positive or auto", [](const Node& node) { check_positive_unless(node, {"auto"}, "a number > 0, or \"auto\""); }},
+    {"boolean or auto",
+     [](const Node& node) {
+       if (node.json() != "auto") node.boolean(false);
+     }},
     {"accuracy",
      [](const Node& node) {
        if (!node.json().is_number()) node.fail("a number of (0, 0.5], or an object with value");

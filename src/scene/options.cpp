@@ -191,6 +191,9 @@ ContactOptions read_contact(const Node& root, double shortest_edge, std::vector<
   if (options.resolve_overlap && !options.enabled)
     contact["initial_overlap"].fail("\"resolve\" without contact", "it where /contact/enabled is true");
   options.convergent = contact["use_convergent_formulation"].boolean(false);
+  const Node averages = contact["average_gaps"];
+  options.may_average_gaps = options.enabled && averages.exists() && averages.json() == "auto";
+  options.average_gaps = options.enabled && !options.may_average_gaps && averages.boolean(false);
   options.friction_coefficient = contact["friction_coefficient"].non_negative(0);
   const Node epsv = contact["epsv"];
   options.friction_velocity = epsv.exists() && epsv.json() == "auto" ? 0 : epsv.positive(1e-3);

@@ -128,7 +128,10 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
   const CollisionProxy<Dim>& proxy = *setup.proxy;
   SurfaceBuilder<Dim> builder(mesh.is_axisymmetric());
   for_each_simplex(proxy, 0, [&](const auto& ids) { builder.add(ids); });
-  return {builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles), proxy_map(setup, mesh), true};
+  ContactSurface<Dim> contact{builder.build(proxy.rest, std::vector<char>(proxy.rest.size(), 1), setup.obstacles),
+                              proxy_map(setup, mesh), true};
+  contact.surface.retraction = proxy.retraction;
+  return contact;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                         \

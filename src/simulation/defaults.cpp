@@ -19,6 +19,7 @@
 #include "simulation/incoming_state.hpp"
 #include "simulation/overlap.hpp"
 #include "simulation/remesh_step.hpp"
+#include "simulation/retraction.hpp"
 #include "simulation/step_length.hpp"
 #include "simulation/step_problem.hpp"
 #include "sizes.hpp"
@@ -348,6 +349,9 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (has_rigid_bodies(this->materials)) choose_rigid_moduli(*this);
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));
+  if (contact.may_average_gaps) contact.average_gaps = averaging_helps(*this);
+  if (contact.enabled && contact.average_gaps)
+    if (std::string chosen = retract_surfaces(*this); !chosen.empty()) words.push_back(std::move(chosen));
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
   if (contact.enabled && contact.friction_velocity == 0 && this->time.has_inertia()) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "unsupported.hpp"
-#include "energy/rigid_body.hpp"
-#include "energy/support.hpp"
 
 #include <algorithm>
 
 #include "energy/elastic/law_table.hpp"
+#include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 #include "itr/core.hpp"
 
 namespace itr {
@@ -43,6 +43,11 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
+    {{"/contact/average_gaps",
+      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with a collision mesh, "
+      "friction "
+      "by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies or the plain form of contact"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !can_average_gaps(setup); }},
     {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},
     {{"/contact/initial_overlap", "\"resolve\" with adhesion, which pulls on what is at rest"},
@@ -158,6 +163,17 @@ std::vector<UnsupportedCombination> unsupported_combinations() {
 }
 
 template <int Dim>
+bool can_average_gaps(const Setup<Dim>& setup) {
+  const ContactOptions& contact = setup.contact;
+  const bool damps = std::ranges::any_of(
+      setup.damping, [](const DampingOptions& options) { return options.term == DampingOptions::Term::contact; });
+  const bool has_other_surface = (setup.proxy && !setup.proxy->retraction) || contact.resolve_overlap || !setup.ties.empty();
+  return Dim == 2 && contact.convergent && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup) &&
+         !has_other_surface && contact.friction_pairs.empty() && !contact.has_adhesion() && !damps &&
+         !has_rigid_bodies(setup.materials);
+}
+
+template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup) {
   refuse(setup, may_curve(setup));
 }
@@ -167,6 +183,8 @@ void refuse_unsupported(const Setup<Dim>& setup, const State<Dim>& state) {
   refuse(setup, state.mesh.has_nodes());
 }
 
+template bool can_average_gaps(const Setup<2>&);
+template bool can_average_gaps(const Setup<3>&);
 template void refuse_unsupported(const Setup<2>&);
 template void refuse_unsupported(const Setup<3>&);
 template void refuse_unsupported(const Setup<2>&, const State<2>&);

@@ -16,6 +16,10 @@ struct UnsupportedCombination {
 /// In the order in which they are checked.
 std::vector<UnsupportedCombination> unsupported_combinations();
 
+/// Whether gaps can be averaged: ContactOptions::average_gaps.
+template <int Dim>
+bool can_average_gaps(const Setup<Dim>& setup);
+
 /// Throws InputError for the first combination that the setup has.
 template <int Dim>
 void refuse_unsupported(const Setup<Dim>& setup);

@@ -138,12 +138,14 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
     if (statics == 0) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
     const double distance = std::sqrt(q.squared);
-    Pair pair{.vertices = s.vertices,
+    Pair pair{.vertices = {},
               .size = s.size(),
-              .coefficients = q.coefficients,
+              .coefficients = Vec<kMost>::Zero(),
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0,
               .kinetic = kinetic / statics};
+    std::copy(s.vertices.begin(), s.vertices.end(), pair.vertices.begin());
+    pair.coefficients.template head<4>() = q.coefficients;
     pair.force = lets_go_ ? held * s.weight * options.adhesion.lagged_pull()
                           : statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
     if (slips_from_touch) {
@@ -153,6 +155,18 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
     }
     pairs_.push_back(pair);
   }
+}
+
+template <int Dim>
+void FrictionEnergy<Dim>::add(const std::vector<AveragedContact::PressedPoint>& points, double coefficient) {
+  if constexpr (Dim == 2)
+    for (const auto& point : points) {
+      pairs_.push_back({.vertices = point.vertices,
+                        .size = point.size,
+                        .coefficients = point.coefficients,
+                        .tangents = tangent_basis(point.normal),
+                        .force = coefficient * point.force});
+    }
 }
 
 /// Relative motion of a pair along its `normal` at the reference, from there to where it is as near as dhat.
@@ -252,7 +266,7 @@ void FrictionEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, W
 
 template <int Dim>
 void FrictionEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 4 * Dim, 4 * Dim> block;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMost * Dim, kMost * Dim> block;
   for (const auto& pair : pairs_) {
     const Vec<kTangents> v = slip_velocity(pair, x);
     const SlipLaw law = law_of(pair);

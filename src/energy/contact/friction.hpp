@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/scratch_vector.hpp"
+#include "energy/contact/averaged_contact.hpp"
 #include "energy/contact/contact.hpp"
 #include "energy/velocity_rule.hpp"
 
@@ -46,6 +47,8 @@ class FrictionEnergy final : public Energy {
   double value(ConstVectorView x, Workspace&) const override;
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override;
   void add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const override;
+  /// Adds friction of points that averaged gaps press, of this coefficient.
+  void add(const std::vector<AveragedContact::PressedPoint>& points, double coefficient);
   bool empty() const { return pairs_.empty(); }
   /// Number of pairs that stuck while vertices moved with `v` [m/s], and slide at x, with less friction.
   int count_let_go(ConstVectorView v, ConstVectorView x) const;
@@ -61,10 +64,11 @@ class FrictionEnergy final : public Energy {
 
  private:
   static constexpr int kTangents = Dim - 1;
+  static constexpr int kMost = Dim == 2 ? AveragedContact::PressedPoint::kMost : 4;  ///< vertices of a pair
   struct Pair {
-    std::array<int, 4> vertices;
+    std::array<int, kMost> vertices;
     int size;
-    Vec<4> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
+    Vec<kMost> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
     Eigen::Matrix<double, Dim, kTangents> tangents;
     double force;                          ///< mu_s * normal force * weight [N]
     double kinetic = 1;                    ///< mu_k by mu_s

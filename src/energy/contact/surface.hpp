@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "itr/types.hpp"
 
 namespace itr {
+
+struct Retraction;
 
 /// For each of n things a list of ids.
 struct Adjacency {
@@ -38,6 +41,8 @@ struct CollisionSurface {
   ClosedFaces closed;  ///< pairs that are no contact yet
   /// By problem vertex, which sides of ContactOptions::friction_pairs it is of: bits as FrictionSides has them. Empty: none.
   std::vector<std::uint64_t> friction_sides;
+
+  std::shared_ptr<const Retraction> retraction{};  ///< 2D: null where gaps are not averaged
 
   // 3D only.
   std::vector<std::array<int, 3>> triangle_edges;  ///< of corners (0 1), (1 2), (2 0)

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: MIT
+#include "energy/contact/averaged_contact.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "core/parallel.hpp"
+#include "core/scratch_vector.hpp"
+#include "fem/quadrature.hpp"
+#include "geometry/bvh.hpp"
+
+namespace itr {
+
+namespace {
+
+constexpr int kDegree = 5;    ///< of quadrature on a piece
+constexpr double kReach = 2;  ///< gaps are bounded by 3/4 of this many widths
+constexpr double kFar = 4;    ///< pieces of one part see each other where they are so many lengths apart at rest
+constexpr std::size_t kBlock = 64;
+
+/// b(s) = -(s - 1)^2 ln s and its derivatives.
+struct Barrier {
+  double value = 0, first = 0, second = 0;
+  explicit Barrier(double s) {
+    if (s >= 1) return;
+    if (!(s > 0)) {
+      value = std::numeric_limits<double>::infinity();
+      return;
+    }
+    const double log = std::log(s), d = s - 1;
+    value = -d * d * log;
+    first = -2 * d * log - d * d / s;
+    second = -2 * log - 4 * d / s + d * d / (s * s);
+  }
+};
+
+/// A gap bounded from above by 3/4 of `most`: the gap itself below half of it.
+struct BoundedGap {
+  double value, first = 0, second = 0;
+  BoundedGap(double gap, double most) {
+    const double half = most / 2, u = (gap - half) / half;
+    if (u <= 0) {
+      value = gap;
+      first = 1;
+    } else if (u < 1) {
+      value = half + half * (u - u * u * u + u * u * u * u / 2);
+      first = 1 - 3 * u * u + 2 * u * u * u;
+      second = 6 * (u * u - u) / half;
+    } else {
+      value = 1.5 * half;
+    }
+  }
+};
+
+}  // namespace
+
+/// The gaps at the positions that were asked for last.
+struct AveragedContact::Cache {
+  const CollisionSurface* surface = nullptr;
+  int revision = 0;
+  ScratchVector x;
+  std::vector<Gap> gaps;
+};
+
+AveragedContact::AveragedContact(const CollisionSurface& surface, double scale)
+    : surface_(&surface),
+      retraction_(surface.retraction.get()),
+      scale_(scale),
+      pieces_(curve_pieces(surface, *surface.retraction)),
+      measure_(surface.area.size(), 0) {
+  for (int i = 0; i < static_cast<int>(pieces_.size()); ++i) {
+    const CurvePiece& piece = pieces_[i];
+    if (!surface.counts[piece.vertex]) continue;
+    double width = 0;
+    for (int k = 0; k < 3; ++k)
+      if (!piece.hats.row(k).isZero(0)) width = std::max(width, retraction_->width[piece.owners[k]]);
+    if (width == 0) continue;
+    for (const auto& node : quadrature<1>(kDegree)) {
+      const double t = node.weights[1];
+      points_.push_back({i, t, node.fraction * piece.length, piece.hats * CurvePiece::powers(t), width});
+      for (int k = 0; k < 3; ++k) measure_[piece.owners[k]] += points_.back().weight * points_.back().hats[k];
+    }
+  }
+}
+
+double AveragedContact::depth(const CurvePiece& piece, double t) const {
+  const Vec<3> hats = piece.hats * CurvePiece::powers(t);
+  double depth = 0;
+  for (int k = 0; k < 3; ++k) depth += hats[k] * retraction_->depth[piece.owners[k]];
+  return depth;
+}
+
+/// All pieces at some positions, in a tree.
+class AveragedContact::GapFinder {
+ public:
+  GapFinder(const AveragedContact& contact, ConstVectorView x) : contact_(contact) {
+    std::vector<Box<2>> boxes;
+    for (const CurvePiece& piece : contact.pieces_) {
+      PlacedPiece placed;
+      for (int k = 0; k < 3; ++k) placed.c[k] = piece.position(piece.coefficients.col(k), x);
+      boxes.emplace_back();
+      boxes.back().include(placed.c[0]);
+      boxes.back().include(placed.c[0] + placed.c[1] / 2);
+      boxes.back().include(placed.at(1));
+      placed_.push_back(placed);
+    }
+    tree_.build(boxes);
+    for (const double depth : contact.retraction_->depth) deepest_ = std::max(deepest_, depth);
+  }
+
+  Gap find(const Point& point) const {
+    const CurvePiece& own = contact_.pieces_[point.piece];
+    const Vec<2> q = placed_[point.piece].at(point.t);
+    const double most = kReach * point.width;
+    std::vector<int> near;
+    tree_.query(Box<2>{q, q}.inflated(most + 2 * deepest_), near);
+    std::sort(near.begin(), near.end());
+    Gap gap;
+    gap.distance = std::numeric_limits<double>::infinity();
+    for (const int i : near) {
+      if (!sees(own, contact_.pieces_[i])) continue;
+      const double t = placed_[i].nearest(q);
+      const Vec<2> separation = q - placed_[i].at(t);
+      if (const double distance = separation.norm(); distance < gap.distance) {
+        gap.distance = distance;
+        gap.foot = i;
+        gap.t = t;
+        gap.normal = separation / distance;
+      }
+    }
+    double value = most;
+    if (gap.foot != kNone)
+      value = gap.distance - contact_.depth(own, point.t) - contact_.depth(contact_.pieces_[gap.foot], gap.t);
+    const BoundedGap bounded(value, most);
+    gap.value = bounded.value;
+    gap.first = bounded.first;
+    gap.second = bounded.second;
+    return gap;
+  }
+
+ private:
+  bool sees(const CurvePiece& own, const CurvePiece& other) const {
+    if (own.part != other.part) return true;
+    const auto& rest = contact_.retraction_->rest;
+    return (rest[own.vertex] - rest[other.vertex]).norm() > kFar * (own.length + other.length);
+  }
+
+  const AveragedContact& contact_;
+  std::vector<PlacedPiece> placed_;
+  Bvh<2> tree_;
+  double deepest_ = 0;
+};
+
+auto AveragedContact::gaps(ConstVectorView x, Workspace& workspace) const -> const std::vector<Gap>& {
+  auto& cache = workspace.get<Cache>();
+  if (cache.surface == surface_ && cache.revision == surface_->revision && cache.x.size() == x.size() &&
+      std::memcmp(cache.x.view().data(), x.data(), sizeof(double) * x.size()) == 0)
+    return cache.gaps;
+  const GapFinder finder(*this, x);
+  cache.gaps.resize(points_.size());
+  parallel_blocks(points_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) cache.gaps[i] = finder.find(points_[i]);
+  });
+  cache.surface = surface_;
+  cache.revision = surface_->revision;
+  cache.x = x;
+  return cache.gaps;
+}
+
+auto AveragedContact::averages(const std::vector<Gap>& gaps) const -> Averages {
+  const std::size_t n = measure_.size();
+  std::vector<double> sum(n, 0);
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (int k = 0; k < 3; ++k)
+      sum[pieces_[points_[i].piece].owners[k]] += points_[i].weight * points_[i].hats[k] * gaps[i].value;
+  Averages result{std::vector<double>(n, 0), std::vector<double>(n, 0), std::vector<double>(n, 0)};
+  for (std::size_t v = 0; v < n; ++v) {
+    const double width = retraction_->width[v];
+    if (!(measure_[v] > 0) || width == 0 || sum[v] >= 0) continue;
+    const Barrier barrier(1 + sum[v] / measure_[v] / width);
+    const double half = retraction_->stiffness / 2;
+    result.value[v] = half * width * barrier.value;
+    result.first[v] = half * barrier.first;
+    result.second[v] = half / width * barrier.second;
+  }
+  return result;
+}
+
+double AveragedContact::value(ConstVectorView x, Workspace& workspace) const {
+  const Averages average = averages(gaps(x, workspace));
+  double sum = 0;
+  for (std::size_t v = 0; v < measure_.size(); ++v)
+    if (average.value[v] > 0) sum += measure_[v] * average.value[v];
+  return scale_ * sum;
+}
+
+auto AveragedContact::pressed(const Point& point, const Gap& gap) const -> PressedPoint {
+  const CurvePiece &own = pieces_[point.piece], &foot = pieces_[gap.foot];
+  PressedPoint result{.normal = gap.normal};
+  const auto add = [&](const CurvePiece& piece, const CurvePiece::Weights& weights, double sign) {
+    for (int k = 0; k < piece.size; ++k) {
+      result.vertices[result.size] = piece.vertices[k];
+      result.coefficients[result.size++] = sign * weights[k];
+    }
+  };
+  add(own, own.at(point.t), 1);
+  add(foot, foot.at(gap.t), -1);
+  return result;
+}
+
+auto AveragedContact::pressed_points(ConstVectorView x, Workspace& workspace) const -> std::vector<PressedPoint> {
+  const std::vector<Gap>& all = gaps(x, workspace);
+  const Averages average = averages(all);
+  std::vector<PressedPoint> result;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!all[i].acts()) continue;
+    double pressure = 0;
+    for (int k = 0; k < 3; ++k) pressure -= points_[i].hats[k] * average.first[pieces_[points_[i].piece].owners[k]];
+    if (pressure == 0) continue;
+    result.push_back(pressed(points_[i], all[i]));
+    result.back().force = points_[i].weight * pressure * all[i].first;
+  }
+  return result;
+}
+
+void AveragedContact::add_gradient(ConstVectorView x, VectorView gradient, Workspace& workspace) const {
+  for (const PressedPoint& p : pressed_points(x, workspace))
+    for (int k = 0; k < p.size; ++k)
+      gradient.segment<2>(2 * p.vertices[k]) -= scale_ * p.force * p.coefficients[k] * p.normal;
+}
+
+/// Adds W b'' grad y grad y^T of each vertex.
+void AveragedContact::add_hessian_of_averages(const std::vector<Gap>& gaps, const Averages& averages,
+                                              HessianSink& sink) const {
+  struct Entry {
+    int vertex;
+    std::size_t point;
+    double weight;
+  };
+  std::vector<Entry> entries;
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    for (int k = 0; k < 3; ++k) {
+      const int v = pieces_[points_[i].piece].owners[k];
+      const double weight = points_[i].weight * points_[i].hats[k] * gaps[i].first;
+      if (weight != 0 && averages.second[v] > 0) entries.push_back({v, i, weight});
+    }
+  std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.vertex < b.vertex; });
+  std::vector<int> vertices;
+  VectorX slope;  // W grad y
+  for (auto begin = entries.begin(); begin != entries.end();) {
+    const int v = begin->vertex;
+    const auto end = std::find_if(begin, entries.end(), [v](const Entry& entry) { return entry.vertex != v; });
+    vertices.clear();
+    for (auto it = begin; it != end; ++it) {
+      const PressedPoint p = pressed(points_[it->point], gaps[it->point]);
+      vertices.insert(vertices.end(), p.vertices.begin(), p.vertices.begin() + p.size);
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    slope.setZero(2 * std::ssize(vertices));
+    for (auto it = begin; it != end; ++it) {
+      const PressedPoint p = pressed(points_[it->point], gaps[it->point]);
+      for (int k = 0; k < p.size; ++k) {
+        const auto at = std::lower_bound(vertices.begin(), vertices.end(), p.vertices[k]) - vertices.begin();
+        slope.segment<2>(2 * at) += it->weight * p.coefficients[k] * p.normal;
+      }
+    }
+    const MatrixX block = scale_ * averages.second[v] / measure_[v] * slope * slope.transpose();
+    sink.add<2>(vertices, block.data());
+    begin = end;
+  }
+}
+
+/// Second derivatives of the bounded gap of a point; the foot follows its nearest place on the piece.
+Mat<20> AveragedContact::curvature(const Point& point, const Gap& gap, const PressedPoint& pressed,
+                                   ConstVectorView x) const {
+  const CurvePiece &own = pieces_[point.piece], &foot = pieces_[gap.foot];
+  const CurvePiece::Weights slope = foot.slope(gap.t);
+  const Vec<2> tangent = foot.position(slope, x), bend = foot.position(foot.bend(), x);
+  Vec<20> first = Vec<20>::Zero(), mixed = Vec<20>::Zero();  // of the distance; of t and the positions
+  Mat<20> hessian = Mat<20>::Zero();
+  for (int k = 0; k < pressed.size; ++k) {
+    first.segment<2>(2 * k) = pressed.coefficients[k] * gap.normal;
+    mixed.segment<2>(2 * k) = -pressed.coefficients[k] * tangent;
+    if (k >= own.size) mixed.segment<2>(2 * k) -= slope[k - own.size] * gap.distance * gap.normal;
+    for (int l = 0; l < pressed.size; ++l)
+      hessian.block<2, 2>(2 * k, 2 * l).diagonal().setConstant(pressed.coefficients[k] * pressed.coefficients[l]);
+  }
+  hessian -= first * first.transpose();
+  const double stiffness = tangent.squaredNorm() - gap.distance * gap.normal.dot(bend);
+  if (gap.t > 0 && gap.t < 1 && stiffness > 0) hessian -= mixed * mixed.transpose() / stiffness;
+  return gap.first / gap.distance * hessian + gap.second * first * first.transpose();
+}
+
+void AveragedContact::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
+  const std::vector<Gap>& all = gaps(x, workspace);
+  const Averages average = averages(all);
+  add_hessian_of_averages(all, average, sink);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!all[i].acts()) continue;
+    double force = 0;
+    for (int k = 0; k < 3; ++k)
+      force += points_[i].weight * points_[i].hats[k] * average.first[pieces_[points_[i].piece].owners[k]];
+    if (force == 0) continue;
+    const PressedPoint p = pressed(points_[i], all[i]);
+    const int n = 2 * p.size;
+    MatrixX block = scale_ * force * curvature(points_[i], all[i], p, x).topLeftCorner(n, n);
+    if (psd != PsdProjection::none) {
+      const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(block);
+      block = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
+    }
+    sink.add<2>(std::span(p.vertices.data(), p.size), block.data());
+  }
+}
+
+}  // namespace itr

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+// Contact by averaged gaps: derivatives, what its forces add up to, and that coarse surfaces slide without teeth.
+#include "energy/contact/averaged_contact.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "core/noise.hpp"
+#include "derivatives.hpp"
+#include "energy/contact/contact.hpp"
+#include "geometry/distance.hpp"
+#include "rings.hpp"
+
+namespace itr {
+namespace {
+
+/// Polylines, each closed or open, whose surface has a retraction.
+struct Lines {
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 2>> edges;
+  std::vector<char> is_corner;
+
+  void add(const std::vector<Vec<2>>& points, bool is_closed) {
+    const int first = static_cast<int>(rest.size()), count = static_cast<int>(points.size());
+    for (int i = 0; i < count; ++i) {
+      rest.push_back(points[i]);
+      is_corner.push_back(!is_closed && (i == 0 || i + 1 == count));
+      if (i + 1 < count || is_closed) edges.push_back({first + i, first + (i + 1) % count});
+    }
+  }
+  CollisionSurface surface(double depth, double width) const {
+    CollisionSurface result = make_collision_surface<2>(edges, {}, {}, rest, std::vector<char>(rest.size(), 1));
+    Retraction retraction;
+    retraction.depth.assign(rest.size(), depth);
+    retraction.width.assign(rest.size(), width);
+    retraction.is_corner = is_corner;
+    retraction.rest = rest;
+    retraction.stiffness = 3;
+    result.retraction = std::make_shared<Retraction>(retraction);
+    return result;
+  }
+  VectorX positions() const {
+    VectorX x(2 * std::ssize(rest));
+    for (std::size_t i = 0; i < rest.size(); ++i) x.segment<2>(2 * static_cast<Eigen::Index>(i)) = rest[i];
+    return x;
+  }
+};
+
+std::vector<Vec<2>> circle(const Vec<2>& center, double radius, int count, double turn = 0) {
+  std::vector<Vec<2>> points;
+  for (int i = 0; i < count; ++i) {
+    const double angle = turn + 2 * std::numbers::pi * i / count;
+    points.emplace_back(center[0] + radius * std::cos(angle), center[1] + radius * std::sin(angle));
+  }
+  return points;
+}
+std::vector<Vec<2>> line(double from, double to, double y, int count) {
+  std::vector<Vec<2>> points;
+  for (int i = 0; i < count; ++i) points.emplace_back(from + (to - from) * i / (count - 1), y);
+  return points;
+}
+
+Lines disc_on_line() {
+  Lines lines;
+  lines.add(circle({0.1, 1.02}, 1, 16), true);
+  lines.add(line(-1.5, 1.5, 0, 12), false);
+  return lines;
+}
+
+TEST(AveragedContact, HasTheDerivativesOfItsEnergy) {
+  const Lines lines = disc_on_line();
+  const CollisionSurface surface = lines.surface(0.02, 0.06);
+  for (std::uint64_t seed = 1; seed < 6; ++seed) {
+    VectorX x = lines.positions();
+    for (Eigen::Index i = 0; i < x.size(); ++i) x[i] += 0.004 * noise(1000 * seed + static_cast<std::uint64_t>(i));
+    const AveragedContact contact(surface, 0.7);
+    Workspace workspace;
+    ASSERT_GT(contact.value(x, workspace), 0);
+    expect_derivatives(contact, x, 1e-7, 2e-5);
+    expect_psd(contact, x);
+  }
+}
+
+TEST(AveragedContact, ForcesAndMomentsAddUpToNothing) {
+  const Lines lines = disc_on_line();
+  const CollisionSurface surface = lines.surface(0.02, 0.06);
+  const VectorX x = lines.positions();
+  const VectorX gradient = gradient_of(AveragedContact(surface, 1), x);
+  Vec<2> force = Vec<2>::Zero();
+  double moment = 0;
+  for (Eigen::Index i = 0; i < std::ssize(lines.rest); ++i) {
+    force += gradient.segment<2>(2 * i);
+    moment += x[2 * i] * gradient[2 * i + 1] - x[2 * i + 1] * gradient[2 * i];
+  }
+  ASSERT_GT(gradient.norm(), 1e-3);
+  EXPECT_LE(force.norm(), 1e-14 * gradient.lpNorm<1>());
+  EXPECT_LE(std::abs(moment), 1e-13 * gradient.lpNorm<1>());
+}
+
+/// The energy of a ring in a bore that is too narrow for it hardly depends on how the ring is turned: it has no teeth. With
+/// pairs of vertices and edges it changes many times over.
+TEST(AveragedContact, OfARingInABoreDoesNotDependOnItsTurn) {
+  const auto energies = [](bool is_averaged) {
+    double least = std::numeric_limits<double>::infinity(), largest = 0;
+    for (int step = 0; step < 10; ++step) {
+      Lines lines;
+      const double depth = 0.02, overlap = is_averaged ? 0.01 : 0.02;
+      lines.add(circle({0, 0}, 1 - depth + overlap, 24, 0.026 * step), true);
+      lines.add(circle({0, 0}, 1 + depth, 24), true);
+      const CollisionSurface surface = lines.surface(depth, 2 * depth);
+      const ContactOptions options{.enabled = true, .dhat = 0.03, .convergent = true};
+      Workspace workspace;
+      const double energy = is_averaged ? AveragedContact(surface, 1).value(lines.positions(), workspace)
+                                        : ContactEnergy<2>(surface, options, 1, 1).value(lines.positions(), workspace);
+      least = std::min(least, energy);
+      largest = std::max(largest, energy);
+    }
+    return largest / least - 1;
+  };
+  EXPECT_LE(energies(true), 2e-3);
+  EXPECT_GE(energies(false), 0.05);
+}
+
+/// Quarters of two rings with a gap between them, of which friction is asked.
+Setup<2> two_rings() {
+  Setup<2> setup = quarter_rings({{0.4, 0.6, 6, 2}, {0.64, 0.8, 7, 2}});
+  for (const int body : {1, 2}) setup.materials[body] = {.youngs_modulus = 1e6 * body, .poisson_ratio = 0.3, .density = 1};
+  setup.time = {.dt = 1, .steps = 1};
+  setup.time.quasistatic = true;
+  setup.contact = {.enabled = true, .dhat = 1e-4, .may_average_gaps = true, .convergent = true, .friction_coefficient = 0.2};
+  return setup;
+}
+
+TEST(AveragedContact, IsChosenWhereBodiesSlideThatConditionsHold) {
+  const auto is_chosen = [](itr::Setup<2> setup) {
+    setup.choose_defaults();
+    EXPECT_EQ(setup.contact.average_gaps, setup.proxy.has_value());
+    return setup.contact.average_gaps;
+  };
+  EXPECT_TRUE(is_chosen(two_rings()));
+  itr::Setup<2> other = two_rings();
+  other.dirichlet.clear();
+  EXPECT_FALSE(is_chosen(other));
+  other = two_rings();
+  other.contact.friction_coefficient = 0;
+  EXPECT_FALSE(is_chosen(other));
+  other = two_rings();
+  other.time.quasistatic = false;
+  EXPECT_FALSE(is_chosen(other));
+  other = two_rings();
+  other.remesh.enabled = true;
+  EXPECT_FALSE(is_chosen(other));
+}
+
+TEST(AveragedContact, ActsOfASurfaceInsideOfTheBodies) {
+  itr::Setup<2> setup = two_rings();
+  setup.choose_defaults();
+  ASSERT_TRUE(setup.proxy);
+  const CollisionProxy<2>& proxy = *setup.proxy;
+  const auto& depth = proxy.retraction->depth;
+  for (int row = 0; row < proxy.weights.rows(); ++row) {
+    double sum = 0;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, row); it; ++it) {
+      EXPECT_GT(it.value(), -1e-15);  // inside of a cell
+      sum += it.value();
+    }
+    EXPECT_NEAR(sum, 1, 1e-14);
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const FacetId f : setup.mesh.live_facets()) {
+      const auto& [a, b] = setup.mesh.facet(f);
+      nearest = std::min(nearest, point_edge_distance_squared<2>(proxy.rest[row], setup.mesh.rest(a), setup.mesh.rest(b)));
+    }
+    EXPECT_GE(std::sqrt(nearest), depth[row] - 1e-14);
+    EXPECT_LE(std::sqrt(nearest), 1.05 * depth[row]);  // farther from a corner that is concave
+  }
+  EXPECT_GT(*std::max_element(depth.begin(), depth.end()), 0.002);
+}
+
+}  // namespace
+}  // namespace itr
