@@ -67,6 +67,12 @@ class Scene(hard_cases.Scene):
         return np.unique(facets[flat])
 
 
+def words_of(function):
+    """Docstring of a case, or of the function that a variant of it calls."""
+    inner = [cell.cell_contents for cell in function.__closure__ or () if callable(cell.cell_contents)]
+    return next((f.__doc__ for f in (function, *inner) if f.__doc__), None)
+
+
 def from_stability(name):
     def fill(scene):
         hard_cases.CASES[name](scene)
@@ -74,6 +80,7 @@ def from_stability(name):
             import table
             rows = {row.case: row for row in table.read(HERE.parent / "stability/results.csv")}
             scene.reference("volume ratio", rows[name].worst_volume, 0.01, "verification/stability/results.csv: same mesh and law")
+    fill.__doc__ = words_of(hard_cases.CASES[name]) or name.replace("_", " ")
     kind = next((kind for start, kind in KINDS.items() if name.startswith(start)), "gap" if "gap" in name else "touching")
     return fill, kind
 
@@ -188,8 +195,7 @@ def write(name, folder):
     folder.mkdir(parents=True, exist_ok=True)
     scene = Scene(folder)
     fill(scene)
-    what = " ".join((fill.__doc__ or hard_cases.CASES.get(name, fill).__doc__ or "").split())
-    about = described(name, kind, what, scene)
+    about = described(name, kind, " ".join((fill.__doc__ or "").split()), scene)
     write_mesh(folder / "mesh.npz", scene)
     for file, content in (("scene.json", about), ("itr.json", for_itr(scene)), ("scenario.json", scenario(about))):
         (folder / file).write_text(json.dumps(content, indent=1) + "\n")

@@ -18,6 +18,8 @@ import numpy as np
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.path.insert(0, str(HERE.parent))
+from harness import stored  # noqa: E402
 
 
 def read_frame(path):
@@ -70,7 +72,8 @@ def run(scene, folder, options):
         store(frames, folder)
         version = subprocess.run([str(options.itr), "--version"], capture_output=True, text=True).stdout.strip()
         times = [frame["t"] for frame in frames]
-        return {"code": "ITR", "version": version, "integrator": "none" if about["time"]["quasistatic"] else "implicit Euler",
+        return {"code": "ITR", "version": version, "commit": stored.made("verification/hard_contact/results-itr.csv"),
+                "integrator": "none" if about["time"]["quasistatic"] else "implicit Euler",
                 "seconds": sum(step.get("processor_seconds", 0) for step in steps),
                 "iterations": sum(step.get("newton_iterations", 0) for step in steps),
                 "factorizations": sum(step.get("factorizations", 0) for step in steps),

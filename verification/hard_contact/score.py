@@ -440,7 +440,7 @@ def score(scene_folder, folder):
     about = json.loads((folder / "result.json").read_text()) if (folder / "result.json").exists() else {}
     row = {"scene": scene_folder.name, "verdict": "", "ended": False, "frames": 0, "intersections": 0, "inversions": 0, "references": "",
            **dict.fromkeys(("setup", "momentum", "energy", "off"), math.nan), "seconds": about.get("seconds", math.nan), "why": ""}
-    row |= {name: about.get(name, "") for name in ("iterations", "certificate", "notes", "code", "version")}
+    row |= {name: about.get(name, "") for name in ("iterations", "certificate", "notes", "code", "version", "commit")}
     frames = read_frames(folder, about, scene.dim)
     row["frames"] = len(frames)
     texts = []
