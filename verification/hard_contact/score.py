@@ -12,10 +12,12 @@ import csv
 import dataclasses
 import json
 import math
+import os
 import pathlib
 import sys
 
-import numpy as np
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices have at most 3 rows
+import numpy as np  # noqa: E402
 
 MOMENTUM_BAR = 1e-3             # change that nothing explains, by all momentum that there was
 ENERGY_BAR = 1e-2               # growth by the energy that is stored
@@ -79,10 +81,9 @@ def overlapping(a, b):
 
     axis = int(np.argmax(np.ptp(np.concatenate([low, low_b]), axis=0)))
     width = (high_b - low_b)[:, axis]
-    is_large = width > 8 * np.median(width)
-    for j in np.flatnonzero(is_large):
+    for j in np.flatnonzero(width > 8 * np.median(width)):
         keep(np.arange(len(low)), np.full(len(low), j))
-    small = np.flatnonzero(~is_large)
+    small = np.flatnonzero(width <= 8 * np.median(width))
     small = small[np.argsort(low_b[small, axis], kind="stable")]
     if len(small):
         starts = low_b[small, axis]
@@ -243,8 +244,7 @@ class Scene:
             self.points, self.simplices, self.body = mesh["points"], mesh["simplices"], mesh["body"]
             self.obstacle_points, self.edges, self.faces, self.obstacle = (
                 mesh["obstacle_" + name] for name in ("points", "edges", "faces", "of_point"))
-        self.dim = self.points.shape[1]
-        self.extent = float(np.ptp(self.points, axis=0).max())
+        self.dim, self.extent = self.points.shape[1], float(np.ptp(self.points, axis=0).max())
         self.gravity = np.array(self.about["gravity"])
         self.bodies = range(1, len(self.about["bodies"]) + 1)
         self.quasistatic = self.about["time"]["quasistatic"]
@@ -327,7 +327,7 @@ class State:
     centre: np.ndarray     # of the masses, by body (b x d)
     volume_ratio: float    # the smallest
     contact: float = 0.0
-    forces: dict = dataclasses.field(default_factory=dict)
+    forces: dict | None = None
 
 
 def state_of(scene, frame, before):
@@ -422,9 +422,11 @@ def setup_error(scene, frames):
     return float(worst)
 
 
-def check_frames(scene, frames, row, texts):
+def check_frames(scene, frames, row):
+    """Counts what is wrong into a row; returns texts."""
+    texts = []
     for number, frame in enumerate(frames):
-        finite = np.isfinite(frame.x).all()  # comparisons with what is no number would all pass
+        finite = np.isfinite(frame.x).all()  # else all comparisons would pass
         wrong, crossed, inside = check_validity(frame.x, frame.simplices, scene.obstacles(frame.t)) if finite else ([0], [], [])
         row["inversions"] += len(wrong)
         if not scene.about["contact"]:
@@ -432,6 +434,7 @@ def check_frames(scene, frames, row, texts):
         row["intersections"] += len(crossed) + len(inside)
         kinds = ((wrong, "simplices that are not positive"), (crossed, "intersections"), (inside, "vertices inside"))
         texts += [f"frame {number}: {len(found)} {kind}, first {np.ravel(found[0]).tolist()}" for found, kind in kinds if len(found)]
+    return texts
 
 
 def score(scene_folder, folder):
@@ -443,17 +446,14 @@ def score(scene_folder, folder):
     row |= {name: about.get(name, "") for name in ("iterations", "certificate", "notes", "code", "version", "commit")}
     frames = read_frames(folder, about, scene.dim)
     row["frames"] = len(frames)
-    texts = []
     if not frames:
         return row | {"verdict": "no result", "why": "no frames"}
     row["ended"] = bool(frames[-1].t >= scene.about["time"]["end"] * (1 - 1e-9))
-    check_frames(scene, frames, row, texts)
+    texts = check_frames(scene, frames, row)
     states = [state_of(scene, frame, before) for before, frame in zip([None, *frames], frames)]
-    for state, value in zip(states, about.get("contact_energy", [])):
-        state.contact = value
-    for name, series in about.get("forces", {}).items():
-        for state, value in zip(states, series):
-            state.forces[name] = value
+    for k, state in enumerate(states):
+        state.contact = about["contact_energy"][k] if "contact_energy" in about else 0.0
+        state.forces = {name: series[k] for name, series in about.get("forces", {}).items()}
     row["setup"], row["momentum"], row["energy"] = setup_error(scene, frames), momentum_error(scene, states), energy_growth(scene, states)
     bars = [("ended", row["ended"]), ("intersections", row["intersections"] == 0), ("inversions", row["inversions"] == 0),
             ("setup", row["setup"] <= SETUP_BAR), ("momentum", not row["momentum"] > MOMENTUM_BAR),
@@ -480,17 +480,17 @@ def main():
     options = parser.parse_args()
     rows = []
     for folder in sorted(options.results.iterdir()):
-        chosen = not options.scene or any(part in folder.name for part in options.scene)
-        if not chosen or not (options.scenes / folder.name / "scene.json").exists():
+        is_asked = not options.scene or any(part in folder.name for part in options.scene)
+        if not is_asked or not (options.scenes / folder.name / "scene.json").exists():
             continue
         rows.append(score(options.scenes / folder.name, folder))
         print(*(f"{rows[-1][key]:.3g}" if isinstance(rows[-1][key], float) else rows[-1][key]
                 for key in ("scene", "verdict", "frames", "momentum", "energy", "off", "seconds", "why")), sep="\t", flush=True)
-    if options.csv and rows:
-        with open(options.csv, "w", newline="") as file:
-            writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+        if options.csv:
+            with open(options.csv, "w", newline="") as file:
+                writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+                writer.writeheader()
+                writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
     print(f"{sum(row['verdict'] == 'right' for row in rows)} of {len(rows)} right")
     return 0 if all(row["verdict"] == "right" for row in rows) else 1
 
