@@ -27,6 +27,7 @@ STORED = {
     "verification/solvers/end_to_end.csv": LINEAR,
     "verification/stability/results.csv": CODE,
     "verification/needs/results.csv": CODE,
+    "verification/hard_contact/results-itr.csv": CODE,
     "verification/adaptive/results.csv": CODE,
     "verification/adaptive/accuracy.csv": CODE,
     **{str(path.relative_to(ROOT)): CODE for path in sorted([*PAPER.glob("*/study.json"), *PAPER.glob("*/steps.csv")])},
