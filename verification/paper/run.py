@@ -249,19 +249,29 @@ def typed(row):
             float(value) if "." in value or "e" in value else int(value) for key, value in row.items()}
 
 
+def free_steps(row):
+    """Steps at whose end nothing touches: their number, mean seconds and Newton iterations, as the table shows them."""
+    touching, free = row["contact_steps"], row["steps"] - row["contact_steps"]
+    if not free:
+        return "none"
+    seconds = row["seconds_per_step"] * row["steps"] - (row["seconds_per_contact_step"] or 0) * touching
+    return f"{free}, {seconds / free:.4f}, {row['newton'] - row['newton_in_contact']}"
+
+
 def table(rows):
     def cell(value, form):
         return "" if value is None else format(value, form)
 
-    lines = ["| scene | end | s/step | reference | ratio | in contact: steps, s/step, iterations | vertices | energy, last step [J] | gained by remeshing, net [J] | reference, gross "
-             "| forgotten [J] | trials / accepted | µs a trial, median | remeshing | MB (reference) |", "|" + "---|" * 15]
+    lines = ["| scene | end | s/step | reference | ratio | in contact: steps, s/step, iterations | free: steps, s/step, iterations | vertices | energy, last step [J] | gained by remeshing, net [J] | reference, gross "
+             "| forgotten [J] | trials / accepted | µs a trial, median | remeshing | MB (reference) |", "|" + "---|" * 16]
     for r in rows:
         ratio = r["reference_seconds"] / r["seconds_per_step"] if r["reference_seconds"] else None
         end = ("finished" if r["finished"] else "stopped") + (", certified" if r["certified"] else ", NOT CERTIFIED")
         touching = f"{r['contact_steps']}, {r['seconds_per_contact_step']:.4f}, {r['newton_in_contact']}" if r["contact_steps"] else "none"
+        free = free_steps(r)
         lines.append(
             f"| {r['case']} | {r['steps']} steps, {end} | {r['seconds_per_step']:.4f} | {cell(r['reference_seconds'], '.4g')} "
-            f"| {cell(ratio, '.0f' if ratio and ratio >= 10 else '.2g')} | {touching} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
+            f"| {cell(ratio, '.0f' if ratio and ratio >= 10 else '.2g')} | {touching} | {free} | {r['vertices_first']}→{r['vertices']} | {r['energy_total']:.6g} | {r['gain']:.4g} "
             f"| {cell(r['reference_gain'], '.4g')} | {cell(r.get('history_loss'), '.3g')} | {r['trials']} / {r['accepted']} "
             f"| {r['microseconds_per_trial'] if r['trials'] else 0:.0f} | {100 * r['remesh_share']:.0f} % "
             f"| {r['peak_rss_mb']:.0f} ({cell(r['reference_mb'], '.0f')}) |")
