@@ -448,6 +448,7 @@ TEST_F(FluidScene, GivesWetFacetsAllConditionsOfTheirSurface) {
   EXPECT_EQ(fluid.critical_pressure, 500);
   ASSERT_EQ(setup.pressure.size(), 1u);
   EXPECT_EQ(setup.pressure[0].tag, wet);
+  EXPECT_EQ(setup.names.surfaces.at("wet 2"), std::vector{wet});
   ASSERT_EQ(setup.dirichlet.size(), 2u);
   EXPECT_EQ(setup.dirichlet[0].tag, 2);
   EXPECT_EQ(setup.dirichlet[1].tag, wet);

@@ -295,7 +295,11 @@ class ConditionReader {
         if (!value.is_zero) load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
       };
       if (const std::optional<Fluid> fluid = read_fluid(node, tags)) {
-        for (const auto& [before, wet] : fluid->wet) press(wet);
+        std::vector<int>& named = setup_.names.surfaces["wet " + text_of(read_condition_label(node["id"]))];
+        for (const auto& [before, wet] : fluid->wet) {
+          press(wet);
+          named.push_back(wet);
+        }
         setup_.fluids.push_back(*fluid);
       } else {
         for (const int tag : tags) press(tag);

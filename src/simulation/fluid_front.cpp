@@ -50,6 +50,13 @@ void for_each_neighbour(const Mesh<3>& mesh, FacetId f, const Visit& visit) {
       if (other != f) visit(other);
 }
 
+/// The tag of a facet before the fluid wetted it.
+int tag_without(const Fluid& fluid, int tag) {
+  for (const auto& [before, wet] : fluid.wet)
+    if (wet == tag) return before;
+  return tag;
+}
+
 bool has(const std::vector<int>& tags, int tag) { return std::ranges::find(tags, tag) != tags.end(); }
 
 /// The surface that a fluid may wet, on a mesh.
@@ -59,7 +66,7 @@ class FluidSurface {
   /// Follows the tags of the mesh, which must outlive this, as `setup` and its `fluid`.
   FluidSurface(const StepSetup<Dim>& setup, const Fluid& fluid, const Mesh<Dim>& mesh)
       : setup_(setup), fluid_(fluid), mesh_(mesh), tag_(mesh.facet_slots(), kNoTag) {
-    for (const FacetId f : mesh.live_facets()) tag_[f] = tag_without_fluid({fluid}, mesh.facet_tag(f));
+    for (const FacetId f : mesh.live_facets()) tag_[f] = tag_without(fluid, mesh.facet_tag(f));
   }
 
   bool has(FacetId f) const { return fluid_.wet.contains(tag_[f]); }
@@ -186,9 +193,7 @@ bool has_reached(const FluidSurface<Dim>& surface, const Mesh<Dim>& mesh, const 
 }  // namespace
 
 int tag_without_fluid(const std::vector<Fluid>& fluids, int tag) {
-  for (const Fluid& fluid : fluids)
-    for (const auto& [before, wet] : fluid.wet)
-      if (wet == tag) return before;
+  for (const Fluid& fluid : fluids) tag = tag_without(fluid, tag);
   return tag;
 }
 
