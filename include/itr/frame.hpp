@@ -135,6 +135,8 @@ struct ITR_EXPORT StepReport {
   /// was averaged over new cells. Over all parts of a step that was cut.
   double history_loss = 0;
   double viscous_dissipation = 0;  ///< by viscoelastic bodies [J]
+  double wetted = 0;               ///< part of the rest area that fluids may wet where they are
+  int leaks = 0;                   ///< fluids that have come to where they should not
   /// By body that edits touched: momentum that they changed, as impulses over the step. The rate of momentum (the
   /// acceleration of the integrator, from the momenta that were reported) times dt is that of the forces plus these. Empty
   /// without inertia.

@@ -72,6 +72,18 @@ struct PressureCondition {
   std::function<double(const RestPoint<Dim>& X, double t)> pressure;
 };
 
+/// A fluid that comes between surfaces in contact: it wets facets with given tags, along facets that share edges (2D:
+/// vertices), where contact presses by less than a critical pressure, and leaves them where contact shuts them. A facet that
+/// is wet has another tag, so that a PressureCondition with that one acts where the fluid is. Conditions that hold
+/// everywhere need both tags.
+struct Fluid {
+  std::string place{};       ///< in messages
+  std::map<int, int> wet{};  ///< tags of wet facets by those of dry ones
+  std::vector<int> from{};   ///< tags (dry) of facets where it is in any case, or beside which it begins; empty: everywhere
+  std::vector<int> leaks_to{};                ///< tags (dry) of facets that it should not come to; empty: none
+  std::optional<double> critical_pressure{};  ///< [Pa] (2D: [N/m]); empty: that of the fluid
+};
+
 /// Gas or fluid in a closed cavity. Its overpressure p acts on the deformed facets with these tags and follows from the
 /// volume V that they enclose, V0 at rest. Of a gas p = (p0 + external) (V0 / V)^exponent - external, of a fluid
 /// p = p0 - bulk_modulus ln(V / V0).
@@ -147,6 +159,7 @@ struct ITR_EXPORT StepSetup {
   std::vector<DirichletCondition<Dim>> dirichlet;
   std::vector<NeumannCondition<Dim>> neumann;
   std::vector<PressureCondition<Dim>> pressure;
+  std::vector<Fluid> fluids;
   std::vector<Cavity> cavities;
   std::vector<Tie> ties;
   SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none

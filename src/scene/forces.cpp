@@ -30,7 +30,7 @@ template <int Dim>
 class ForceReader {
  public:
   ForceReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh)
-      : parts_(parts), sets_(sets), facet_tags_(facet_tags(mesh)) {}
+      : parts_(parts), sets_(sets), facet_tags_(sets.facet_tags(mesh)) {}
 
   ForceTarget read(const Node& node) const {
     ForceTarget target;

@@ -3,7 +3,6 @@
 
 #include <set>
 
-#include "mesh/facet_tags.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -14,7 +13,7 @@ template <int Dim>
 class PairReader {
  public:
   PairReader(const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh)
-      : parts_(parts), sets_(sets), facet_tags_(facet_tags(mesh)) {}
+      : parts_(parts), sets_(sets), facet_tags_(sets.facet_tags(mesh)) {}
 
   FrictionPair read(const Node& node) const {
     FrictionPair pair{side(node["a"]), side(node["b"])};

@@ -452,6 +452,7 @@ Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles&
     if (const auto label = read_obstacle_label(geometry);
         label && (geometry.has("surface_selection") || references.surfaces.contains(*label)))
       sets.surfaces.key({*label});
+  add_penetrated(root, sets.surfaces);
   sets.bodies.choose();
   sets.surfaces.choose();
   for (int& body : all.body) body = sets.bodies.id(body);

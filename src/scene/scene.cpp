@@ -55,8 +55,9 @@ std::set<int> body_ids(const Mesh<Dim>& mesh) {
 
 /// Ids and names of a geometry that a program brings: every number stands for itself.
 template <int Dim>
-Sets sets_of(const Geometry<Dim>& geometry) {
+Sets sets_of(const Node& root, const Geometry<Dim>& geometry) {
   Sets sets;
+  add_penetrated(root, sets.surfaces);
   std::set<int> surfaces = facet_tags(geometry.mesh);
   surfaces.insert(geometry.id.begin(), geometry.id.end());
   for (VertexId v = 0; v < geometry.mesh.num_vertices(); ++v) surfaces.insert(geometry.mesh.vertex_tag(v));
@@ -281,7 +282,7 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
     if (root.has(key)) root[key].fail("the key", "no such key: the program brings these itself");
   if (root.has("accuracy")) root["accuracy"].fail("the key", "no such key: a program chooses steps and tolerances itself");
   if (!read_units(root).is_si()) root["units"].fail("SI units: a program brings its geometry in metres");
-  const Sets sets = sets_of(geometry);
+  const Sets sets = sets_of(root, geometry);
   Setup<Dim> setup;
   setup.names = {sets.bodies.names(), sets.surfaces.names()};
   setup.mesh = std::move(geometry.mesh);

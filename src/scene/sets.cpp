@@ -45,6 +45,8 @@ References collect_references(const Node& root) {
   for (const char* list : {"dirichlet_boundary", "neumann_boundary", "normal_aligned_neumann_boundary",
                            "nodal_neumann_boundary", "pressure_boundary", "obstacle_displacements"})
     for (const Node& entry : root["boundary_conditions"][list].items()) add_labels(entry["id"], references.surfaces);
+  for (const Node& entry : root["boundary_conditions"]["pressure_boundary"].items())
+    for (const char* key : {"from", "leaks_to"}) add_labels(entry[key], references.surfaces);
   for (const Node& entry : root["contact"]["friction_pairs"].items())
     for (const char* side : {"a", "b"})
       for (auto* labels : {&references.bodies, &references.surfaces}) add_labels(entry[side], *labels);
@@ -60,6 +62,14 @@ References collect_references(const Node& root) {
   }
   references.surfaces.erase({0, "all"});  // of them
   return references;
+}
+
+void add_penetrated(const Node& root, LabelIds& surfaces) {
+  for (const Node& entry : root["boundary_conditions"]["pressure_boundary"].items()) {
+    std::set<Label> labels;
+    if (entry["penetrates"].boolean(false)) add_labels(entry["id"], labels);
+    for (const Label& label : labels) surfaces.add_penetrated(label);
+  }
 }
 
 int LabelIds::key(const std::set<Label>& labels, int preferred) {
@@ -85,6 +95,14 @@ void LabelIds::choose() {
     }
     ids_.push_back(id);
     for (const Label& label : labels) of_[label].push_back(id);
+  }
+  const auto is_penetrated = [&](const Label& label) { return penetrated_.contains(label); };
+  for (std::size_t key = 0; key < sets_.size(); ++key) {
+    const std::set<Label>& labels = sets_[key].first;
+    if (!penetrated_.contains({0, "all"}) && std::ranges::none_of(labels, is_penetrated)) continue;
+    while (!taken.insert(next).second) ++next;
+    wet_[ids_[key]] = next;
+    for (const Label& label : labels) of_[label].push_back(next);
   }
 }
 

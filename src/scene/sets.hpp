@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "itr/mesh.hpp"
+#include "mesh/facet_tags.hpp"
 #include "node.hpp"
 
 namespace itr::scene {
@@ -41,6 +42,11 @@ class LabelIds {
   /// Notes the name that a file gives the number of a key, which the scene does not ask for: output keeps it where it is the
   /// only one. Empty: there is none.
   void imply(int key, const std::string& name);
+  /// Notes that a fluid penetrates a surface ("all": all of them): its facets get another id once they are wet, which stands
+  /// for each of their sets, too.
+  void add_penetrated(const Label& label) { penetrated_.insert(label); }
+  /// Ids of wet facets, by those that they have before.
+  const std::map<int, int>& wet() const { return wet_; }
   /// Chooses the ids of all keys. A part that is in a numbered set only has its number.
   void choose();
   int id(int key) const { return ids_[key]; }
@@ -66,6 +72,8 @@ class LabelIds {
   std::vector<std::pair<std::set<Label>, int>> sets_;  ///< by key: labels, preferred id
   std::vector<int> ids_;                               ///< by key
   std::map<Label, std::vector<int>> of_;
+  std::set<Label> penetrated_;
+  std::map<int, int> wet_;
   std::map<Label, std::string> why_;
   std::map<int, std::string> implied_;  ///< names by key
 };
@@ -73,6 +81,18 @@ class LabelIds {
 /// Bodies by the ids of their cells; surfaces by the tags of facets and vertices, and the ids of obstacles.
 struct Sets {
   LabelIds bodies, surfaces;
+
+  /// Tags that facets of the mesh have, and those that they get where they are wetted.
+  template <int Dim>
+  std::set<int> facet_tags(const Mesh<Dim>& mesh) const {
+    std::set<int> tags = itr::facet_tags(mesh);
+    for (const auto& [before, wet] : surfaces.wet())
+      if (tags.contains(before)) tags.insert(wet);
+    return tags;
+  }
 };
+
+/// Notes the surfaces that fluids of the scene penetrate.
+void add_penetrated(const Node& root, LabelIds& surfaces);
 
 }  // namespace itr::scene

@@ -129,7 +129,7 @@ std::vector<int> read_surfaces(const Node& node, const Sets& sets, const std::se
 
 template <int Dim>
 void read_supports(const Node& root, const Sets& sets, Setup<Dim>& setup) {
-  const std::set<int> with_facets = facet_tags(setup.mesh);
+  const std::set<int> with_facets = sets.facet_tags(setup.mesh);
   for (const Node& node : root["springs"].items())
     setup.nodal_loads.push_back(
         SpringEntry<Dim>{std::make_shared<const Spring>(read_spring(node, sets, with_facets, setup.mesh))});

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <set>
 
-#include "mesh/facet_tags.hpp"
 #include "readers.hpp"
 #include "supports.hpp"
 
@@ -10,7 +9,7 @@ namespace itr::scene {
 
 template <int Dim>
 std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh) {
-  const std::set<int> with_facets = facet_tags(mesh);
+  const std::set<int> with_facets = sets.facet_tags(mesh);
   const auto read_side = [&](const Node& node) {
     return read_surfaces(node, sets, with_facets, "the ids of the surfaces on this side of the tie");
   };

@@ -17,17 +17,21 @@ namespace {
 Vec<2> normal_of(const Mat<2, 1>& tangent) { return {tangent[1], -tangent[0]}; }
 Vec<3> normal_of(const Mat<3, 2>& tangents) { return tangents.col(0).cross(tangents.col(1)); }
 
-}  // namespace
-
+/// Forces on vertices: a curved edge's node leaves its own to the ends.
 template <int Dim>
-VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force) {
-  constexpr int kDegree = 4;
-  constexpr double kOfSimplex = Dim == 2 ? 1 : 0.5;  // area of the facet where barycentric coordinates are orthogonal
+VectorX at_vertices(const Mesh<Dim>& mesh, ConstVectorView force) {
   const int vertices = mesh.num_vertices();
   VectorX total = force.head(Dim * vertices);
   for (int node = vertices; node < mesh.num_nodes(); ++node)
     for (const VertexId v : mesh.edge_of_node(node)) vertex_of<Dim>(total, v) += vertex_of<Dim>(force, node) / 2;
-  VectorX pushed = VectorX::Zero(vertices), pulled = pushed;
+  return total;
+}
+
+/// Calls visit(facet, its k-th corner, the corner's share, area times outward normal) for parts of all facets.
+template <int Dim, typename Visit>
+void for_each_part(const Mesh<Dim>& mesh, ConstVectorView x, const Visit& visit) {
+  constexpr int kDegree = 4;
+  constexpr double kOfSimplex = Dim == 2 ? 1 : 0.5;  // area of the facet where barycentric coordinates are orthogonal
   Eigen::Matrix<double, Dim - 1, Dim> linear;
   linear.col(0).setConstant(-1);
   linear.template rightCols<Dim - 1>().setIdentity();
@@ -43,12 +47,23 @@ VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorVi
       const double turn = mesh.is_axisymmetric() ? 2 * std::numbers::pi * at[0] : 1;
       const Vec<Dim> area =
           point.fraction * kOfSimplex * turn * normal_of(Mat<Dim, Dim - 1>(positions * gradients.transpose()));
-      for (int k = 0; k < Dim; ++k) {
-        const double along = point.weights[k] * area.dot(vertex_of<Dim>(total, facet[k]));
-        (along < 0 ? pushed : pulled)[facet[k]] += std::abs(along);
-      }
+      for (int k = 0; k < Dim; ++k) visit(f, k, point.weights[k], area);
     }
   }
+}
+
+}  // namespace
+
+template <int Dim>
+VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force) {
+  const int vertices = mesh.num_vertices();
+  const VectorX total = at_vertices(mesh, force);
+  VectorX pushed = VectorX::Zero(vertices), pulled = pushed;
+  for_each_part(mesh, x, [&](FacetId f, int k, double share, const Vec<Dim>& area) {
+    const VertexId v = mesh.facet(f)[k];
+    const double along = share * area.dot(vertex_of<Dim>(total, v));
+    (along < 0 ? pushed : pulled)[v] += std::abs(along);
+  });
   VectorX pressure = VectorX::Zero(mesh.num_nodes());
   for (VertexId v = 0; v < vertices; ++v) {
     const double most = std::max(pushed[v], pulled[v]);  // area times force
@@ -61,7 +76,43 @@ VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorVi
   return pressure;
 }
 
-template VectorX contact_pressure<2>(const Mesh<2>&, ConstVectorView, ConstVectorView);
-template VectorX contact_pressure<3>(const Mesh<3>&, ConstVectorView, ConstVectorView);
+template <int Dim>
+std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force,
+                                               const std::function<bool(FacetId)>& take) {
+  constexpr double kLeastTaken = 0.1;  // of what all have: a side that is hardly turned to the contact takes nothing
+  const int vertices = mesh.num_vertices();
+  const VectorX total = at_vertices(mesh, force);
+  std::vector<std::array<Vec<Dim>, Dim>> areas(mesh.facet_slots());
+  for (auto& corners : areas) corners.fill(Vec<Dim>::Zero());
+  for_each_part(mesh, x, [&](FacetId f, int k, double share, const Vec<Dim>& area) { areas[f][k] += share * area; });
+  VectorX pushed = VectorX::Zero(vertices), taken = pushed;  // area times force
+  const auto push = [&](FacetId f, int k) {
+    return std::max(0.0, -areas[f][k].dot(vertex_of<Dim>(total, mesh.facet(f)[k])));
+  };
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f)
+    for (int k = 0; k < Dim; ++k) {
+      pushed[mesh.facet(f)[k]] += push(f, k);
+      if (take(f)) taken[mesh.facet(f)[k]] += push(f, k);
+    }
+  std::vector<double> pressure(mesh.facet_slots(), 0);
+  for (FacetId f = 0; f < mesh.facet_slots(); ++f) {
+    double area = 0;
+    for (int k = 0; k < Dim; ++k) {
+      const VertexId v = mesh.facet(f)[k];
+      area += areas[f][k].norm();
+      const bool are_takers = taken[v] > kLeastTaken * pushed[v];
+      if (push(f, k) > 0 && (!are_takers || take(f)))
+        pressure[f] += push(f, k) * vertex_of<Dim>(total, v).norm() / (are_takers ? taken : pushed)[v];
+    }
+    if (area > 0) pressure[f] /= area;
+  }
+  return pressure;
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                                  \
+  template VectorX contact_pressure<Dim>(const Mesh<Dim>&, ConstVectorView, ConstVectorView);                 \
+  template std::vector<double> contact_pressure_on_facets(const Mesh<Dim>&, ConstVectorView, ConstVectorView, \
+                                                          const std::function<bool(FacetId)>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

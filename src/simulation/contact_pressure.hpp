@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "itr/mesh.hpp"
 #include "itr/types.hpp"
 
@@ -11,5 +14,12 @@ namespace itr {
 /// force on a curved edge is one of its ends', and its pressure their mean.
 template <int Dim>
 VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
+
+/// Contact force on each facet of a compact mesh by its present area [Pa], 0 where it pulls. The facets around a vertex have
+/// parts of its force as above; where some of them `take` it, which pressed facets do at the rim of contact, the others have
+/// none of it.
+template <int Dim>
+std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force,
+                                               const std::function<bool(FacetId)>& take);
 
 }  // namespace itr

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "itr/setup.hpp"
@@ -9,10 +10,10 @@
 namespace itr {
 
 /// Throws InputError at `place` for a target that names nothing, or a surface, a body or a vertex of an obstacle that is not
-/// there.
+/// there. `surfaces`: tags of facets.
 template <int Dim>
-void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_t obstacle_vertices,
-                    const std::string& place);
+void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, const std::set<int>& surfaces,
+                    std::size_t obstacle_vertices, const std::string& place);
 
 /// Sums forces like force_sums(), for a target that was checked.
 template <int Dim>

@@ -16,6 +16,7 @@
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/flat_obstacles.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/named.hpp"
 #include "simulation/rigid_coordinates.hpp"
@@ -212,6 +213,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   State<Dim> state;
   state.mesh = initial_mesh(setup);
   close_coincident_faces(setup, state.mesh);
+  wet_sources(setup, state.mesh);
   state.t = setup.time.t0;
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
   const std::vector<Vec<Dim>>& rest = state.mesh.rest();

@@ -248,6 +248,7 @@ class OverlapResolver {
     StepSetup<Dim> alone = setup_;
     alone.neumann.clear();
     alone.pressure.clear();
+    alone.fluids.clear();
     alone.cavities.clear();
     alone.body_acceleration = nullptr;
     alone.nodal_loads.clear();

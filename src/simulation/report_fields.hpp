@@ -88,6 +88,8 @@ inline constexpr std::tuple kStepFields{
     ReportField{"min_volume_ratio", &StepReport::min_volume_ratio, AddUp::least, "", everywhere},
     ReportField{"history_loss", &StepReport::history_loss, AddUp::sum, "J", everywhere},
     ReportField{"viscous_dissipation", &StepReport::viscous_dissipation, AddUp::sum, "J", everywhere | if_any},
+    ReportField{"wetted", &StepReport::wetted, AddUp::last, "", everywhere | if_any},
+    ReportField{"leaks", &StepReport::leaks, AddUp::last, "", everywhere | if_any},
     ReportField{"indefinite", &StepReport::indefinite, AddUp::sum, "", in_files},
     ReportField{"damped_steps", &StepReport::damped_steps, AddUp::sum, "", in_files},
     ReportField{"refined_quadrature", &StepReport::refined_quadrature, AddUp::last, "", in_files},

@@ -10,6 +10,7 @@
 #include "fem/cell_set.hpp"
 #include "itr/core.hpp"
 #include "mesh/facet_tags.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/moment.hpp"
 
@@ -50,11 +51,10 @@ void refuse_unknown_ids(std::span<const int> ids, const std::set<int>& known, co
 }  // namespace
 
 template <int Dim>
-void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_t obstacle_vertices,
-                    const std::string& place) {
+void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, const std::set<int>& surfaces,
+                    std::size_t obstacle_vertices, const std::string& place) {
   if (target.surfaces.empty() && target.bodies.empty() && target.obstacle_vertices.empty())
     throw InputError({"", place, "no surfaces, bodies or obstacles", "at least one of them"});
-  const std::set<int> surfaces = facet_tags(mesh);
   std::set<int> bodies;
   for (const CellId c : mesh.live_cells()) bodies.insert(mesh.body(c));
   refuse_unknown_ids(target.surfaces, surfaces, place, "the id of a surface");
@@ -68,7 +68,7 @@ void refuse_unknown(const ForceTarget& target, const Mesh<Dim>& mesh, std::size_
 template <int Dim>
 ForceSums<Dim> force_sums(const State<Dim>& state, const NodalForces& forces, const ForceTarget& target) {
   const auto nodes = static_cast<std::size_t>(state.history.x[0].size()) / Dim;
-  refuse_unknown(target, state.mesh, nodes - static_cast<std::size_t>(state.mesh.num_nodes()),
+  refuse_unknown(target, state.mesh, facet_tags(state.mesh), nodes - static_cast<std::size_t>(state.mesh.num_nodes()),
                  "forces of '" + target.name + "'");
   return sum_forces(state, forces, target);
 }
@@ -120,13 +120,15 @@ Resultant<Dim> resultant(const Simulation<Dim>& simulation, std::span<const int>
   ForceTarget target{.name = "resultant"};
   target.surfaces.assign(tags.begin(), tags.end());
   std::copy(about.begin(), about.end(), target.about.begin());
-  return force_sums(simulation.state(), simulation.forces(), target).all;
+  refuse_unknown(target, simulation.mesh(), known_tags(simulation.setup(), simulation.mesh()), 0, "forces of 'resultant'");
+  return sum_forces(simulation.state(), simulation.forces(), target).all;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                \
-  template void refuse_unknown<Dim>(const ForceTarget&, const Mesh<Dim>&, std::size_t, const std::string&); \
-  template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&);    \
-  template ForceSums<Dim> sum_forces<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);       \
+#define ITR_INSTANTIATE(Dim)                                                                                 \
+  template void refuse_unknown<Dim>(const ForceTarget&, const Mesh<Dim>&, const std::set<int>&, std::size_t, \
+                                    const std::string&);                                                     \
+  template Resultant<Dim> resultant<Dim>(const Simulation<Dim>&, std::span<const int>, const Vec<Dim>&);     \
+  template ForceSums<Dim> sum_forces<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);        \
   template ForceSums<Dim> force_sums<Dim>(const State<Dim>&, const NodalForces&, const ForceTarget&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

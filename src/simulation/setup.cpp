@@ -16,6 +16,7 @@
 #include "itr/core.hpp"
 #include "mesh/facet_tags.hpp"
 #include "simulation/coupled_points.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/step_terms.hpp"
 
@@ -227,7 +228,7 @@ void check_surfaces(const std::string& place, const std::vector<int>& tags, cons
 template <int Dim>
 void check_ties(const Setup<Dim>& setup) {
   if (setup.ties.empty()) return;
-  const std::set<int> with_facets = facet_tags(setup.mesh);
+  const std::set<int> with_facets = known_tags(setup, setup.mesh);
   for (std::size_t i = 0; i < setup.ties.size(); ++i)
     for (const auto& [key, tags] : {std::pair{"a", &setup.ties[i].a}, std::pair{"b", &setup.ties[i].b}})
       check_surfaces(fmt::format("/ties/{}/{}", i, key), *tags, with_facets);
@@ -285,7 +286,7 @@ void check_supports(const Setup<Dim>& setup) {
   const auto springs = springs_of<Dim>(setup.nodal_loads);
   const auto couplings = couplings_of<Dim>(setup.nodal_loads);
   if (springs.empty() && couplings.empty()) return;
-  const std::set<int> with_facets = facet_tags(setup.mesh);
+  const std::set<int> with_facets = known_tags(setup, setup.mesh);
   for (std::size_t i = 0; i < springs.size(); ++i) {
     check_surfaces(fmt::format("/springs/{}/id", i), springs[i]->surfaces, with_facets);
     check_stiffness(fmt::format("/springs/{}/stiffness", i), springs[i]->stiffness, Dim);
@@ -381,11 +382,13 @@ void Setup<Dim>::validate() const {
   check_materials(*this);
   check_proxy(*this);
   check_cavities(*this);
+  refuse_idle_fluids(*this, mesh);
   check_ties(*this);
   check_rigid(*this);
   check_supports(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
-    refuse_unknown(this->fields.curves[i], mesh, this->obstacles.rest.size(), element("fields.curves", i));
+    refuse_unknown(this->fields.curves[i], mesh, known_tags(*this, mesh), this->obstacles.rest.size(),
+                   element("fields.curves", i));
   for (const auto& [name, list] :
        {std::pair{"initial_displacement", &initial_displacement}, std::pair{"initial_velocity", &initial_velocity},
         std::pair{"initial_acceleration", &initial_acceleration}})

@@ -22,6 +22,7 @@
 #include "simulation/contact_surface.hpp"
 #include "simulation/effort_clock.hpp"
 #include "simulation/energy_guard.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/stability.hpp"
@@ -115,6 +116,7 @@ class StepSolver {
       report_.min_volume_ratio = min_volume_ratio(problem_->cells(), x_);
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
+    tell_of_fluids();
     next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
     if (accuracy_.is_on()) {
       report_.dt = setup_.time.dt;
@@ -188,7 +190,7 @@ class StepSolver {
       settle_chords();
     else
       x_ = next_.history.x[0];
-    first_summary_ = solve_between_chords(expected());
+    first_summary_ = solve_with_fluids(expected());
     must_settle_ = false;  // a cut would not help what remeshing does
     if (!first_summary_.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
@@ -236,6 +238,22 @@ class StepSolver {
     const auto phase = ScopedPhase::coarse("problem");
     problem_ = std::make_unique<StepProblem<Dim>>(setup_, next_.mesh, next_.history, next_.t, tools_.cache, next_.stiffness,
                                                   next_.quadrature, next_.chords);
+  }
+
+  /// Solves from x, and again from there as long as fluids come or go.
+  NewtonSummary solve_with_fluids(const VectorX& expected = {}) {
+    NewtonSummary summary = solve_between_chords(expected);
+    FluidFront<Dim> front(setup_, next_.t);
+    while (!setup_.fluids.empty() && summary.converged()) {
+      const Eigen::Index bodies = Dim * Eigen::Index{next_.mesh.num_nodes()};
+      const VectorX force = -problem_->gradients(x_).contact.head(bodies) / problem_->scaling();
+      if (!front.move(next_.mesh, x_.head(bodies), force)) break;
+      next_.strata = {};  // which know tags
+      next_.stiffness = problem_->stiffness();
+      next_.quadrature = problem_->quadrature_levels();
+      summary = solve_between_chords();
+    }
+    return summary;
   }
 
   /// Solves from x, and again from there as long as curves leave their chords too far: with more chords, and where there are
@@ -347,6 +365,20 @@ class StepSolver {
     report_.history_loss += end.loss;
   }
 
+  /// Reports where fluids are, and says when one comes to where it should not.
+  void tell_of_fluids() {
+    if (setup_.fluids.empty()) return;
+    const FluidReach before = reach_of_fluids(setup_, before_.mesh), now = reach_of_fluids(setup_, next_.mesh);
+    report_.wetted = now.fraction;
+    for (std::size_t i = 0; i < now.leaks.size(); ++i) {
+      if (!now.leaks[i]) continue;
+      ++report_.leaks;
+      if (!before.leaks[i])
+        warn(fmt::format("the fluid of {} leaks from t = {} on: it has come to the surface of leaks_to",
+                         setup_.fluids[i].place, setup_.units.text(next_.t, "s")));
+    }
+  }
+
   /// Warns where faces that are no contact begin to be pressed into each other.
   void tell_of_closed_faces() const {
     if (has_only_tied_faces(setup_, next_.mesh)) return;
@@ -412,7 +444,7 @@ class StepSolver {
     }
     renumbering_ = std::move(*renumbering);
     settle_chords();
-    const NewtonSummary summary = solve_between_chords();
+    const NewtonSummary summary = solve_with_fluids();
     if (summary.termination == Termination::cancelled) return failed(summary);
     std::string reason = summary.converged() ? find_invalid() : reason_of(summary);
     if (reason.empty()) return std::nullopt;
@@ -449,7 +481,7 @@ class StepSolver {
       std::string failure = "contact lets no edge become curved";
       if (renumbering) {
         settle_chords();
-        const NewtonSummary summary = solve_between_chords();
+        const NewtonSummary summary = solve_with_fluids();
         if (summary.termination == Termination::cancelled) return summary;
         failure = summary.converged() ? find_invalid() : reason_of(summary);
       }

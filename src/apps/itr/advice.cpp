@@ -25,6 +25,7 @@
 #include "mesh_figures.hpp"
 #include "resolution.hpp"
 #include "simulation/barrier_stiffness.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/incoming_state.hpp"
 #include "simulation/named.hpp"
 #include "simulation/sizes.hpp"
@@ -265,7 +266,7 @@ void find_held_loads(const Setup<Dim>& setup, std::vector<std::string>& found) {
   const Mesh<Dim>& mesh = setup.mesh;
   std::set<int> tags;
   for (const auto& load : setup.neumann) tags.insert(load.tag);
-  for (const auto& load : setup.pressure) tags.insert(load.tag);
+  for (const auto& load : setup.pressure) tags.insert(tag_without_fluid(setup.fluids, load.tag));
   for (const Cavity& cavity : setup.cavities) tags.insert(cavity.surfaces.begin(), cavity.surfaces.end());
   if (tags.empty() || setup.dirichlet.empty()) return;
   std::set<int> free_tags;

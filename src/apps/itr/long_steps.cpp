@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "itr/core.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/sizes.hpp"
 #include "simulation/step_length.hpp"
 
@@ -41,10 +42,11 @@ std::vector<Prescribed> all_prescribed(const Setup<Dim>& setup, const Vec<Dim>& 
   for (const auto& c : setup.neumann)
     all.push_back({fmt::format("the traction on the surface {}", c.tag),
                    [&c, X = place_with(setup, c.tag)](double t) -> VectorX { return c.traction(X, t); }});
-  for (const auto& c : setup.pressure)
-    all.push_back({fmt::format("the pressure on the surface {}", c.tag), [&c, X = place_with(setup, c.tag)](double t) {
-                     return VectorX(VectorX::Constant(1, c.pressure(X, t)));
-                   }});
+  for (const auto& c : setup.pressure) {
+    const int tag = tag_without_fluid(setup.fluids, c.tag);
+    all.push_back({fmt::format("the pressure on the surface {}", tag),
+                   [&c, X = place_with(setup, tag)](double t) { return VectorX(VectorX::Constant(1, c.pressure(X, t))); }});
+  }
   for (const Cavity& cavity : setup.cavities)
     if (cavity.pressure)
       all.push_back({"the pressure of " + cavity.name,

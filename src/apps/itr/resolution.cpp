@@ -10,6 +10,7 @@
 #include "energy/energy.hpp"
 #include "energy/rigid_body.hpp"
 #include "fem/cell_set.hpp"
+#include "simulation/fluid_front.hpp"
 #include "simulation/sizes.hpp"
 
 namespace itr::cli {
@@ -108,7 +109,8 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
     for (const auto& condition : setup.neumann)
       if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, condition.traction(X, t).norm());
     for (const auto& condition : setup.pressure)
-      if (condition.tag == mesh.facet_tag(f)) raise(actions.traction, std::abs(condition.pressure(X, t)));
+      if (tag_without_fluid(setup.fluids, condition.tag) == mesh.facet_tag(f))
+        raise(actions.traction, std::abs(condition.pressure(X, t)));
     for (const Cavity& cavity : setup.cavities)
       if (cavity.pressure && std::ranges::find(cavity.surfaces, mesh.facet_tag(f)) != cavity.surfaces.end())
         raise(actions.traction, std::abs(cavity.pressure(t)));
