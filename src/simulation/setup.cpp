@@ -53,7 +53,21 @@ void check_time(const TimeOptions& time) {
   require(time.step_cuts >= 0 && time.step_cuts <= 20, "/time/step_cuts", time.step_cuts, "0 to 20");
 }
 
-void check_contact(const ContactOptions& contact) {
+/// Two coefficients of friction: their directions, and that they fall by one ratio.
+void check_across(const std::string& place, const FrictionPair& pair, int dim) {
+  const FrictionAcross& across = *pair.across;
+  require_not_negative(place + "/static", across.statics);
+  require_not_negative(place + "/kinetic", across.kinetic);
+  if (!pair.has_two()) return;
+  constexpr double kSameRatio = 1.001e-3;
+  require(
+      std::abs(pair.kinetic * across.statics - across.kinetic * pair.statics) <= kSameRatio * pair.statics * across.statics,
+      place + "/kinetic", across.kinetic, "kinetic by static as the same ratio in both directions");
+  if (dim == 2) refuse(place, "two coefficients", "one coefficient: in the plane, surfaces slide along one line only");
+  require_positive(place + "/direction", across.direction.norm());
+}
+
+void check_contact(const ContactOptions& contact, int dim) {
   if (!contact.enabled) return;
   require_not_negative("/contact/dhat", contact.dhat);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
@@ -67,6 +81,7 @@ void check_contact(const ContactOptions& contact) {
     require_not_negative(place + "/kinetic", pairs[i].kinetic);
     require(pairs[i].kinetic <= pairs[i].statics, place + "/kinetic", pairs[i].kinetic,
             fmt::format("at most the static coefficient, {}", pairs[i].statics));
+    if (pairs[i].across) check_across(place, pairs[i], dim);
   }
   require_not_negative("/contact/epsv", contact.friction_velocity);
   require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
@@ -355,7 +370,7 @@ void check_proxy(const Setup<Dim>& setup) {
 template <int Dim>
 void StepSetup<Dim>::validate() const {
   check_time(time);
-  check_contact(contact);
+  check_contact(contact, Dim);
   check_newton(newton);
   check_remeshing(remesh);
   check_obstacles(obstacles);

@@ -38,6 +38,7 @@ struct CollisionSurface {
   ClosedFaces closed;  ///< pairs that are no contact yet
   /// By problem vertex, which sides of ContactOptions::friction_pairs it is of: bits as FrictionSides has them. Empty: none.
   std::vector<std::uint64_t> friction_sides;
+  VectorX rest;  ///< positions [m], where a direction of friction turns with a surface; else empty
 
   // 3D only.
   std::vector<std::array<int, 3>> triangle_edges;  ///< of corners (0 1), (1 2), (2 0)
