@@ -194,6 +194,8 @@ struct ContactOptions {
 /// other; small gaps between them at rest stay (docs/theory.md, "Ties").
 struct Tie {
   std::vector<int> a{}, b{};
+  /// Displacement of b less that of a by time, where they are opposite sides of a periodic cell [m].
+  std::function<Vec<3>(double)> jump{};
 };
 
 // Damping.

@@ -241,6 +241,7 @@ void check_surfaces(const std::string& place, const std::vector<int>& tags, cons
 
 template <int Dim>
 void check_ties(const Setup<Dim>& setup) {
+  constexpr double kSameShape = 0.999;  ///< of opposite sides of periodic cells
   if (setup.ties.empty()) return;
   const std::set<int> with_facets = facet_tags(setup.mesh);
   for (std::size_t i = 0; i < setup.ties.size(); ++i)
@@ -249,7 +250,11 @@ void check_ties(const Setup<Dim>& setup) {
   const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
   const std::vector<Mortar<Dim>> mortars = mortars_of(setup, setup.mesh, cells);
   for (std::size_t i = 0; i < mortars.size(); ++i)
-    if (mortars[i].covered == 0)
+    if (setup.ties[i].jump && mortars[i].covered < kSameShape)
+      refuse(fmt::format("/ties/{}/periodic", i),
+             fmt::format("surfaces of which one, moved upon the other, covers {:.1f} % of it", 100 * mortars[i].covered),
+             "opposite sides of a cell, which differ by a translation only");
+    else if (mortars[i].covered == 0)
       refuse(fmt::format("/ties/{}", i),
              fmt::format("surfaces that are {} apart, or do not face each other",
                          setup.units.text(distance_of_sides(cells, setup.ties[i]), "m", 3)),
