@@ -277,6 +277,7 @@ TEST_F(FrictionPairScenes, RefuseWhatNothingHasWithTheNearestName) {
     return failure(with_pairs(json::array({pair}))).place.substr(sizeof("/contact/friction_pairs/0") - 1);
   };
   EXPECT_EQ(wrong({{"a", "rubber"}, {"b", 17}, {"coefficient", 0.1}}), "/b");
+  EXPECT_EQ(wrong({{"a", 9}, {"b", "steel"}, {"coefficient", 0.1}}), "/b") << "obstacles alone never slide";
   EXPECT_EQ(wrong({{"a", "rubber"}, {"coefficient", 0.1}}), "/b");
   EXPECT_EQ(wrong({{"a", "rubber"}, {"b", 9}}), "");
   EXPECT_EQ(wrong({{"a", "rubber"}, {"b", 9}, {"coefficient", 0.1}, {"static", 0.1}}), "");

@@ -489,6 +489,7 @@ TEST_F(RigidScene, WhatHasNoMeaningIsRefused) {
   EXPECT_EQ(place("/geometry/0/rigid/force", {1, 2, 3}), "/geometry/0/rigid/force");
   EXPECT_EQ(place("/geometry/0/rigid/moment", {1, 2, 3}), "/geometry/0/rigid/moment");
   EXPECT_EQ(place("/geometry/0/rigid/about", json::array({1})), "/geometry/0/rigid/about");
+  EXPECT_EQ(place("/geometry/0/rigid/about", json::array({1e9, 0})), "/geometry/0/rigid/about") << "round-off hides turns";
   EXPECT_EQ(place("/geometry/0/rigid/weight", 1), "/geometry/0/rigid/weight");
   EXPECT_EQ(place("/geometry/0/is_obstacle", true), "/geometry/0/rigid");
 

@@ -108,6 +108,16 @@ struct FrictionSide {
   std::vector<int> bodies{};             ///< ids
   std::vector<int> surfaces{};           ///< tags of boundary facets
   std::vector<int> obstacle_vertices{};  ///< indices into Obstacles::rest
+  bool operator==(const FrictionSide&) const = default;
+};
+
+/// Coefficients of a FrictionPair across a direction in 3D; its own are those along it (docs/theory.md, "Friction").
+struct FrictionAcross {
+  enum class Frame { space, a, b };  ///< b: it turns with the surface of side b
+  double statics = 0, kinetic = 0;   ///< by the same ratio as those along it
+  Vec<3> direction =
+      Vec<3>::Zero();  ///< projected into the plane of contact; where that is normal to it, all slip is across
+  Frame frame = Frame::space;
 };
 
 /// Coefficients of friction between two surfaces, in either order; both may be the same.
@@ -115,6 +125,13 @@ struct FrictionPair {
   FrictionSide a, b;
   double statics = 0;  ///< mu_s: the most that friction resists before it slides, by the normal force
   double kinetic = 0;  ///< mu_k of what slides, at most mu_s
+  std::optional<FrictionAcross> across{};
+
+  bool has_two() const { return across && across->statics != statics; }
+  double largest() const { return across ? std::max(statics, across->statics) : statics; }
+  bool falls() const { return kinetic < statics || (across && across->kinetic < across->statics); }
+  /// Whether it has to know how a surface turns.
+  bool turns() const { return has_two() && across->frame != FrictionAcross::Frame::space; }
 };
 inline constexpr int kMostFrictionPairs = 32;
 
@@ -155,13 +172,16 @@ struct ContactOptions {
 
   double largest_friction() const {
     double largest = friction_coefficient;
-    for (const FrictionPair& pair : friction_pairs) largest = std::max(largest, pair.statics);
+    for (const FrictionPair& pair : friction_pairs) largest = std::max(largest, pair.largest());
     return largest;
   }
   bool has_friction() const { return enabled && friction_iterations != 0 && largest_friction() > 0; }
+  bool has_turning_friction() const {
+    return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.turns(); });
+  }
   /// Whether friction falls where something begins to slide.
   bool has_static_friction() const {
-    return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.kinetic < p.statics; });
+    return std::any_of(friction_pairs.begin(), friction_pairs.end(), [](const auto& p) { return p.falls(); });
   }
   AdhesionOptions adhesion{};
   double tie_reach = 0;  ///< how far surfaces that are tied may overlap, for their meshes do not match [m]; 0: no ties
@@ -177,6 +197,8 @@ struct ContactOptions {
 /// other; small gaps between them at rest stay (docs/theory.md, "Ties").
 struct Tie {
   std::vector<int> a{}, b{};
+  /// Displacement of b less that of a by time, where they are opposite sides of a periodic cell [m].
+  std::function<Vec<3>(double)> jump{};
 };
 
 // Damping.

@@ -197,12 +197,24 @@ struct TieOverlap {
   Side<Dim> own, other;
   std::vector<Piece<Dim>> pieces;
   std::vector<int> vertices;  ///< of facets that overlap, ascending
+  bool is_own_b = false;
+  /// From where the pieces are to either side: with a jump, side b is laid upon side a.
+  std::array<Vec<Dim>, 2> offsets{Vec<Dim>::Zero(), Vec<Dim>::Zero()};
 };
+
+template <int Dim>
+Vec<Dim> centroid(const Side<Dim>& side) {
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (const auto& corners : side.corners)
+    for (const Vec<Dim>& p : corners) sum += facet_area(corners) / Dim * p;
+  return sum / side.area;
+}
 
 template <int Dim>
 class MortarBuilder {
  public:
   using Element = typename CellSet<Dim>::Element;
+  /// All three must outlive this.
   MortarBuilder(const CellSet<Dim>& cells, const TieOverlap<Dim>& overlap, const std::function<bool(int, int)>& is_weak)
       : cells_(cells), overlap_(overlap), is_weak_(is_weak) {
     std::map<int, double> all, covered;
@@ -222,6 +234,8 @@ class MortarBuilder {
                        .elements = {},
                        .vertices = overlap_.vertices};
     mortar.covered = covered_by<Dim>(overlap_.pieces, overlap_.own);
+    mortar.is_own_b = overlap_.is_own_b;
+    mortar.to_own = overlap_.offsets[0] - overlap_.offsets[1];
     for (auto piece = overlap_.pieces.begin(); piece != overlap_.pieces.end();) {
       const int f = piece->own;
       local_.clear();
@@ -258,7 +272,8 @@ class MortarBuilder {
       Vec<Dim> X = Vec<Dim>::Zero();
       for (int k = 0; k < Dim; ++k) X += point.weights[k] * piece.corners[k];
       const double part = area * point.fraction;
-      const auto at_own = weights_at<Dim>(cells_, own, X), at_other = weights_at<Dim>(cells_, other, X);
+      const auto at_own = weights_at<Dim>(cells_, own, X + overlap_.offsets[0]);
+      const auto at_other = weights_at<Dim>(cells_, other, X + overlap_.offsets[1]);
       std::array<double, Dim> psi;
       for (int k = 0; k < Dim; ++k) {
         psi[k] = at_own[std::ranges::find(own.vertices, facet[k]) - own.vertices.begin()];
@@ -337,13 +352,18 @@ class MortarBuilder {
 
 template <int Dim>
 TieOverlap<Dim> overlap_of_tie(Sides<Dim>& sides, const Tie& tie) {
-  TieOverlap<Dim> overlap{sides.find(tie.a), sides.find(tie.b), {}, {}};
+  TieOverlap<Dim> overlap{.own = sides.find(tie.a), .other = sides.find(tie.b), .pieces = {}, .vertices = {}};
+  if (tie.jump) overlap.offsets[1] = centroid(overlap.other) - centroid(overlap.own);
+  for (Corners<Dim>& corners : overlap.other.corners)
+    for (Vec<Dim>& p : corners) p -= overlap.offsets[1];
   overlap.pieces = pieces_of(overlap.own, overlap.other);
   std::vector<Piece<Dim>> opposite = pieces_of(overlap.other, overlap.own);
   const double of_a = covered_by<Dim>(overlap.pieces, overlap.own), of_b = covered_by<Dim>(opposite, overlap.other);
   const bool is_finer = overlap.other.facets.size() > overlap.own.facets.size();
   if (of_b >= kLeastCovered ? is_finer || of_a < kLeastCovered : of_a < kLeastCovered && of_b > of_a) {
     std::swap(overlap.own, overlap.other);
+    std::swap(overlap.offsets[0], overlap.offsets[1]);
+    overlap.is_own_b = true;
     overlap.pieces = std::move(opposite);
   }
   std::set<int> vertices;
@@ -368,8 +388,14 @@ std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const
     for (const int v : overlaps.back().vertices) ++ties_at[v];
   }
   const std::function<bool(int, int)> is_weak = [&](int v, int c) { return ties_at[v] > 1 || is_held(v, c); };
+  const std::function<bool(int, int)> is_never = [](int, int) { return false; };
   std::vector<Mortar<Dim>> mortars;
-  for (const auto& overlap : overlaps) mortars.push_back(MortarBuilder<Dim>(cells, overlap, is_weak).build());
+  for (std::size_t i = 0; i < ties.size(); ++i) {
+    mortars.push_back(MortarBuilder<Dim>(cells, overlaps[i], ties[i].jump ? is_never : is_weak).build());
+    mortars.back().tie = static_cast<int>(i);
+    if (ties[i].jump)
+      mortars.back().covered *= std::min(1.0, overlaps[i].own.area / overlaps[i].other.area);  // of the larger
+  }
   return mortars;
 }
 

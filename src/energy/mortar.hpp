@@ -34,9 +34,12 @@ struct Mortar {
   /// Facets of side 0 that side 1 covers or touches, and cells that they are of.
   std::vector<std::array<int, Dim>> facets;
   std::vector<const typename CellSet<Dim>::Element*> elements;
-  std::vector<int> vertices;  ///< of facets of both sides that overlap, ascending
-  double covered = 0;         ///< of side 0's area
-  double longest_edge = 0;    ///< of those facets [m]
+  std::vector<int> vertices;           ///< of facets of both sides that overlap, ascending
+  double covered = 0;                  ///< of side 0's area
+  double longest_edge = 0;             ///< of those facets [m]
+  int tie = 0;                         ///< its index
+  bool is_own_b = false;               ///< whether side 0 is the tie's b
+  Vec<Dim> to_own = Vec<Dim>::Zero();  ///< from points of side 1 to those of side 0, of periodic cells [m]
 };
 
 inline constexpr double kLeastCovered = 0.9;   ///< of a side, for a tie
@@ -44,7 +47,7 @@ inline constexpr double kLargestTieGap = 0.1;  ///< at rest, of the edges there
 
 /// Makes the mortars of ties on `cells`, which have to outlive them. `is_held(node, c)`: whether a condition holds the
 /// node's component c. Functions at such vertices, at those where two ties meet and at those that hardly overlap have no
-/// conditions of their own: the functions beside them take their place.
+/// conditions of their own: the functions beside them take their place. Of ties with a jump all functions have conditions.
 template <int Dim>
 std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const Tie> ties,
                                       const std::function<bool(int node, int c)>& is_held);

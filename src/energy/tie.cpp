@@ -83,7 +83,7 @@ TieEnergy<Dim>::TieEnergy(const CellSet<Dim>& cells, const std::vector<Mortar<Di
   extent_ = rest_.cwiseAbs().maxCoeff();
   for (const auto& mortar : mortars)
     for (const auto& row : mortar.rows)
-      rows_.push_back({&row, kStiffness * stiffness_beside(row, materials, has_inertia, scale), Vec<Dim>::Zero(),
+      rows_.push_back({&row, &mortar, kStiffness * stiffness_beside(row, materials, has_inertia, scale), Vec<Dim>::Zero(),
                        Vec<Dim>::Zero(), Vec<Dim>::Zero()});
 }
 
@@ -166,6 +166,16 @@ void TieEnergy<Dim>::add_hessian(ConstVectorView, PsdProjection, HessianSink& si
 }
 
 template <int Dim>
+void TieEnergy<Dim>::set_jumps(std::span<const Tie> ties, double t) {
+  for (Row& row : rows_) {
+    const Tie& tie = ties[static_cast<std::size_t>(row.mortar->tie)];
+    if (!tie.jump) continue;
+    const Vec<Dim> jump = (row.mortar->is_own_b ? 1 : -1) * tie.jump(t).template head<Dim>();
+    for (int c = 0; c < Dim; ++c) row.target[c] = row.of->components[c] ? row.of->measure * jump[c] : 0;
+  }
+}
+
+template <int Dim>
 void TieEnergy<Dim>::begin_at(ConstVectorView base) {
   for (Row& row : rows_) row.start = gap(row, base);
 }
@@ -243,7 +253,8 @@ std::vector<TractionOfTie<Dim>> TieEnergy<Dim>::tractions() const {
     for (int side = 0; side < 2; ++side)
       for (const int tag : mortar.tags[side])
         tractions.emplace_back(
-            tag, [field, sign = side == 0 ? -1.0 : 1.0](const RestPoint<Dim>& X) { return Vec<Dim>(sign * (*field)(X)); });
+            tag, [field, sign = side == 0 ? -1.0 : 1.0, shift = Vec<Dim>(side == 0 ? 0 * mortar.to_own : mortar.to_own)](
+                     const RestPoint<Dim>& X) { return Vec<Dim>(sign * (*field)(X + shift)); });
   }
   return tractions;
 }

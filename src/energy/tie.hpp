@@ -35,6 +35,8 @@ class TieEnergy final : public Energy, public IncrementalTerm, public Constraint
   double value_at(const Increment& at, Workspace&) const override;
   void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override;
 
+  /// Lets the gaps of ties with a jump go to that at time t.
+  void set_jumps(std::span<const Tie> ties, double t);
   /// Sets where increments begin: gaps there count as they are, whatever round-off others suppose of the base.
   void begin_at(ConstVectorView base);
   /// Lets the gaps go to `fraction` of these, of a field over nodes, instead of to none [m].
@@ -53,6 +55,7 @@ class TieEnergy final : public Energy, public IncrementalTerm, public Constraint
  private:
   struct Row {
     const MortarRow<Dim>* of;
+    const Mortar<Dim>* mortar;
     double stiffness;  ///< k [N/m^Dim]
     Vec<Dim> multiplier, target;
     Vec<Dim> start;  ///< gap where increments begin

@@ -127,8 +127,9 @@ std::vector<FrictionPair> read_friction_pairs(const Node& root, const PartNames&
 
 // `/ties`.
 
-/// Throws InputError for ids that no surface of a body has, and for one that both sides have.
+/// Throws InputError for ids that no surface of a body has, for one that both sides have, and for a jump of what is not
+/// periodic.
 template <int Dim>
-std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh);
+std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh, const TimeOptions& time);
 
 }  // namespace itr::scene

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "rigid.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -144,12 +146,18 @@ void read_rigid_bodies(const Node& root, const LabelIds& bodies, Setup<Dim>& set
     if (node.has("mass") && node.has("density")) node["density"].fail("a mass and a density", "one of them");
     if (setup.time.has_inertia() && !node.has("mass") && !node.has("density"))
       node["mass"].fail("a mass or a density, which dynamics needs");
+    constexpr double kFarthest = 1e4;
     const auto body = std::make_shared<RigidBody>();
     body->about.head<Dim>() = volume.centre;
+    const Vec<3> centre = body->about;
     if (const Node about = node["about"]; about.exists()) {
       const std::vector<double> numbers = about.numbers();
       if (numbers.size() != Dim) about.fail(std::to_string(Dim) + " numbers");
       body->about.head<Dim>() = Eigen::Map<const Vec<Dim>>(numbers.data());
+      const double size = std::pow(volume.volume, 1.0 / Dim);
+      if (!((body->about - centre).stableNorm() <= kFarthest * size))
+        about.fail(abbreviate(about.json()) + ", from where round-off hides the body's turn",
+                   fmt::format("a point at most {:g} times the body's size from it", kFarthest));
     }
     read_held(node["held"], Dim, body->held_position, body->held_rotation);
     body->force = read_vector<Dim>(node["force"], setup.time, body->about);

@@ -105,7 +105,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   read_rigid_bodies(root, sets.bodies, setup);
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   read_preset_problem<Dim>(root, sets.bodies, setup);
-  setup.ties = read_ties<Dim>(root, sets, setup.mesh);
+  setup.ties = read_ties<Dim>(root, sets, setup.mesh, setup.time);
   read_supports<Dim>(root, sets, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }

@@ -3,19 +3,31 @@
 #include <set>
 
 #include "readers.hpp"
+#include "rigid.hpp"
 #include "supports.hpp"
 
 namespace itr::scene {
 
 template <int Dim>
-std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh) {
+std::function<Vec<3>(double)> read_jump(const Node& node, const TimeOptions& time) {
+  const Node jump = node["jump"];
+  if (!node["periodic"].boolean(false)) {
+    if (jump.exists()) jump.fail(abbreviate(jump.json()) + ", which has no effect", "\"periodic\": true beside it");
+    return {};
+  }
+  if (auto function = read_vector<Dim>(jump, time, Vec<3>::Zero())) return function;
+  return [](double) { return Vec<3>(Vec<3>::Zero()); };
+}
+
+template <int Dim>
+std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& mesh, const TimeOptions& time) {
   const std::set<int> with_facets = sets.facet_tags(mesh);
   const auto read_side = [&](const Node& node) {
     return read_surfaces(node, sets, with_facets, "the ids of the surfaces on this side of the tie");
   };
   std::vector<Tie> ties;
   for (const Node& node : root["ties"].items()) {
-    const Tie& tie = ties.emplace_back(Tie{read_side(node["a"]), read_side(node["b"])});
+    const Tie& tie = ties.emplace_back(Tie{read_side(node["a"]), read_side(node["b"]), read_jump<Dim>(node, time)});
     for (const int tag : tie.a)
       if (std::ranges::find(tie.b, tag) != tie.b.end())
         node["b"].fail(abbreviate(node["b"].json()) + ", which side a has too", "surfaces of two sides");
@@ -23,7 +35,8 @@ std::vector<Tie> read_ties(const Node& root, const Sets& sets, const Mesh<Dim>& 
   return ties;
 }
 
-#define ITR_INSTANTIATE(Dim) template std::vector<Tie> read_ties(const Node&, const Sets&, const Mesh<Dim>&);
+#define ITR_INSTANTIATE(Dim) \
+  template std::vector<Tie> read_ties(const Node&, const Sets&, const Mesh<Dim>&, const TimeOptions&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

@@ -68,7 +68,8 @@ std::vector<char> tied_vertices(const StepSetup<Dim>& setup, const Mesh<Dim>& me
   std::vector<char> tied(mesh.num_vertices(), 0);
   std::set<int> tags;
   for (const Tie& tie : setup.ties)
-    for (const auto* side : {&tie.a, &tie.b}) tags.insert(side->begin(), side->end());
+    if (!tie.jump)
+      for (const auto* side : {&tie.a, &tie.b}) tags.insert(side->begin(), side->end());
   if (tags.empty()) return tied;
   for (const FacetId f : mesh.live_facets())
     if (tags.contains(mesh.facet_tag(f)))
@@ -103,7 +104,8 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
   if (setup.proxy) return;
   const CellSet<Dim> cells = setup.ties.empty() ? CellSet<Dim>() : whole_mesh(mesh, {});
   for (const auto& mortar : mortars_of(setup, mesh, cells))
-    for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
+    if (!setup.ties[mortar.tie].jump)
+      for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
   if (!setup.contact.enabled) return;
   std::vector<char> bonded(mesh.num_vertices(), 0);
   for (VertexId v = 0; v < mesh.num_vertices(); ++v) bonded[v] = mesh.steps_apart(v) == 0;

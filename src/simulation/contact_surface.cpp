@@ -114,6 +114,16 @@ std::vector<std::uint64_t> friction_sides_of(const StepSetup<Dim>& setup, const 
 }
 
 template <int Dim>
+VectorX rest_of_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ContactSurface<Dim>& contact) {
+  const std::vector<Vec<Dim>>&nodes = mesh.rest(), &others = setup.obstacles.rest;
+  VectorX rest(static_cast<Eigen::Index>(Dim * (nodes.size() + others.size())));
+  int point = 0;
+  for (const auto* points : {&nodes, &others})
+    for (const Vec<Dim>& X : *points) vertex_of<Dim>(rest, point++) = X;
+  return contact.map ? contact.map->positions(rest) : rest;
+}
+
+template <int Dim>
 ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, const ChordLevels& levels, int age) {
   if (!setup.proxy) {
     ContactSurface<Dim> contact{};
@@ -123,6 +133,7 @@ ContactSurface<Dim> contact_surface(const StepSetup<Dim>& setup, const Mesh<Dim>
       contact.surface = collision_surface(mesh, setup.obstacles);
     contact.surface.closed = closed_faces_of(setup, mesh, age, contact);
     contact.surface.friction_sides = friction_sides_of(setup, mesh, contact);
+    if (setup.contact.has_turning_friction()) contact.surface.rest = rest_of_surface(setup, mesh, contact);
     return contact;
   }
   const CollisionProxy<Dim>& proxy = *setup.proxy;

@@ -291,7 +291,8 @@ double tie_reach(const Setup<Dim>& setup) {
   constexpr double kByEdge = 0.25;
   const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
   double longest = 0;
-  for (const auto& mortar : mortars_of(setup, setup.mesh, cells)) longest = std::max(longest, mortar.longest_edge);
+  for (const auto& mortar : mortars_of(setup, setup.mesh, cells))
+    if (!setup.ties[mortar.tie].jump) longest = std::max(longest, mortar.longest_edge);
   return kByEdge * longest;
 }
 

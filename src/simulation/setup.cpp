@@ -54,7 +54,21 @@ void check_time(const TimeOptions& time) {
   require(time.step_cuts >= 0 && time.step_cuts <= 20, "/time/step_cuts", time.step_cuts, "0 to 20");
 }
 
-void check_contact(const ContactOptions& contact) {
+/// Two coefficients of friction: their directions, and that they fall by one ratio.
+void check_across(const std::string& place, const FrictionPair& pair, int dim) {
+  const FrictionAcross& across = *pair.across;
+  require_not_negative(place + "/static", across.statics);
+  require_not_negative(place + "/kinetic", across.kinetic);
+  if (!pair.has_two()) return;
+  constexpr double kSameRatio = 1.001e-3;
+  require(
+      std::abs(pair.kinetic * across.statics - across.kinetic * pair.statics) <= kSameRatio * pair.statics * across.statics,
+      place + "/kinetic", across.kinetic, "kinetic by static as the same ratio in both directions");
+  if (dim == 2) refuse(place, "two coefficients", "one coefficient: in the plane, surfaces slide along one line only");
+  require_positive(place + "/direction", across.direction.norm());
+}
+
+void check_contact(const ContactOptions& contact, int dim) {
   if (!contact.enabled) return;
   require_not_negative("/contact/dhat", contact.dhat);
   require_not_negative("/solver/contact/barrier_stiffness", contact.barrier_stiffness);
@@ -68,6 +82,7 @@ void check_contact(const ContactOptions& contact) {
     require_not_negative(place + "/kinetic", pairs[i].kinetic);
     require(pairs[i].kinetic <= pairs[i].statics, place + "/kinetic", pairs[i].kinetic,
             fmt::format("at most the static coefficient, {}", pairs[i].statics));
+    if (pairs[i].across) check_across(place, pairs[i], dim);
   }
   require_not_negative("/contact/epsv", contact.friction_velocity);
   require_not_negative("/solver/contact/friction_convergence_tol", contact.friction_tolerance);
@@ -227,6 +242,7 @@ void check_surfaces(const std::string& place, const std::vector<int>& tags, cons
 
 template <int Dim>
 void check_ties(const Setup<Dim>& setup) {
+  constexpr double kSameShape = 0.999;  ///< of opposite sides of periodic cells
   if (setup.ties.empty()) return;
   const std::set<int> with_facets = known_tags(setup, setup.mesh);
   for (std::size_t i = 0; i < setup.ties.size(); ++i)
@@ -235,7 +251,11 @@ void check_ties(const Setup<Dim>& setup) {
   const CellSet<Dim> cells = whole_mesh(setup.mesh, {});
   const std::vector<Mortar<Dim>> mortars = mortars_of(setup, setup.mesh, cells);
   for (std::size_t i = 0; i < mortars.size(); ++i)
-    if (mortars[i].covered == 0)
+    if (setup.ties[i].jump && mortars[i].covered < kSameShape)
+      refuse(fmt::format("/ties/{}/periodic", i),
+             fmt::format("surfaces of which one, moved upon the other, covers {:.1f} % of it", 100 * mortars[i].covered),
+             "opposite sides of a cell, which differ by a translation only");
+    else if (mortars[i].covered == 0)
       refuse(fmt::format("/ties/{}", i),
              fmt::format("surfaces that are {} apart, or do not face each other",
                          setup.units.text(distance_of_sides(cells, setup.ties[i]), "m", 3)),
@@ -356,7 +376,7 @@ void check_proxy(const Setup<Dim>& setup) {
 template <int Dim>
 void StepSetup<Dim>::validate() const {
   check_time(time);
-  check_contact(contact);
+  check_contact(contact, Dim);
   check_newton(newton);
   check_remeshing(remesh);
   check_obstacles(obstacles);

@@ -142,7 +142,7 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
   if (!history.v.empty()) last_motion_ = relative_motion<Dim>(history.v[0]) * setup.time.dt;
   if (!history.v.empty() && setup.contact.has_static_friction()) start_velocity_ = history.v[0];
   potential_.elastic()->set_quadrature_levels(levels);
-  add_ties(history);
+  add_ties(history, t);
   if (!terms_.has_inertia && setup.newton.indefinite == IndefiniteHessian::project)
     if (auto loose = find_loose_parts<Dim>(cells_, base_, with_supports(setup, cells_, scope_->coupled, held_.held),
                                            setup.materials, tie_ ? tie_->bonds() : std::vector<std::vector<int>>());
@@ -155,12 +155,13 @@ StepProblem<Dim>::StepProblem(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh
 /// in each step: half of the gap and of the way that its velocity goes in half a step are left, of which nothing is left
 /// after two steps.
 template <int Dim>
-void StepProblem<Dim>::add_ties(const History& history) {
+void StepProblem<Dim>::add_ties(const History& history, double t) {
   if (scope_->mortars.empty()) return;
   tie_ = std::make_shared<TieEnergy<Dim>>(cells_, scope_->mortars, setup_.materials, terms_.has_inertia, terms_.scaling);
   terms_.tie = tie_;
   if (terms_.has_inertia && TimeIntegrator(setup_.time).is_trapezoidal(history))
     tie_->add_targets(0.5, VectorX(base_ - rest_positions<Dim>(cells_) + setup_.time.dt / 2 * history.v[0]));
+  tie_->set_jumps(setup_.ties, t);
   tie_->begin_at(base_);
   constraints_.push_back(tie_.get());
 }

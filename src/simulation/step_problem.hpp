@@ -154,7 +154,7 @@ class StepProblem {
   VectorX contact_gradient(const VectorX& x);
   void find_impact(const History& history, const VectorX& x, const VectorX& v, const VectorX& before, const VectorX& now,
                    TimeErrors& errors);
-  void add_ties(const History& history);
+  void add_ties(const History& history, double t);
   void reset_system();
   SparseSystem& system();
   /// Adds what is never assembled to it.

@@ -34,6 +34,11 @@ bool has_couplings(const Setup<Dim>& setup) {
 }
 
 template <int Dim>
+bool is_periodic(const Setup<Dim>& setup) {
+  return std::ranges::any_of(setup.ties, [](const Tie& tie) { return static_cast<bool>(tie.jump); });
+}
+
+template <int Dim>
 struct Check {
   UnsupportedCombination combination;
   bool (*applies)(const Setup<Dim>&, bool);
@@ -74,6 +79,10 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool) { return setup.consistent_initial_acceleration && has_couplings(setup); }},
     {{"/ties", "ties where a collision mesh touches"},
      [](const Setup<Dim>& setup, bool) { return !setup.ties.empty() && setup.contact.enabled && setup.proxy; }},
+    {{"/ties", "periodic cells with inertia"},
+     [](const Setup<Dim>& setup, bool) { return is_periodic(setup) && setup.time.has_inertia(); }},
+    {{"/ties", "periodic cells that are axisymmetric"},
+     [](const Setup<Dim>& setup, bool) { return is_periodic(setup) && setup.mesh.is_axisymmetric(); }},
     {{"/initial_conditions/acceleration", "\"consistent\" accelerations of bodies that are tied"},
      [](const Setup<Dim>& setup, bool) { return !setup.ties.empty() && setup.consistent_initial_acceleration; }},
     {{"/solver/advanced/lump_mass_matrix",

@@ -44,6 +44,12 @@ std::string coefficients_text(const ContactOptions& contact) {
     const FrictionPair& pair = contact.friction_pairs[i];
     text += fmt::format(", pair {}: {}", i, pair.statics);
     if (pair.kinetic != pair.statics) text += fmt::format(" to {}", pair.kinetic);
+    if (!pair.has_two()) continue;
+    const FrictionAcross& across = *pair.across;
+    text += fmt::format(" along ({:g}, {:g}, {:g}), {}", across.direction[0], across.direction[1], across.direction[2],
+                        across.statics);
+    if (across.kinetic != across.statics) text += fmt::format(" to {}", across.kinetic);
+    text += " across";
   }
   return text;
 }

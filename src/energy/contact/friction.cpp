@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "energy/contact/friction_directions.hpp"
 #include "energy/contact/pairs.hpp"
 #include "mesh/cell_of_facet.hpp"
 
@@ -21,6 +22,7 @@ namespace {
 template <int N>
 Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, const SlipLaw& law) {
   const double y = v.norm(), isotropic = law.by_speed(y);
+  if (isotropic == 0) return Mat<N>::Zero();
   Mat<N> inner = Mat<N>::Identity();
   if (y > 0) {
     double slope = 1;  // of y / f1(y)
@@ -36,7 +38,9 @@ Mat<N> linearised_ratio(const Vec<N>& v, const Vec<N>& w, const SlipLaw& law) {
 
 /// Coefficients of friction of an active pair.
 struct Coefficients {
-  double statics, kinetic;
+  double statics, kinetic;                     ///< the larger ones of two
+  const FrictionPair* by_direction = nullptr;  ///< where there are two
+  bool is_first_a = true;                      ///< whether the first primitive is of its side a
 };
 Coefficients coefficients_of(const ContactStencil& pair, const ContactOptions& options, const CollisionSurface& surface) {
   if (!surface.friction_sides.empty()) {
@@ -45,8 +49,11 @@ Coefficients coefficients_of(const ContactStencil& pair, const ContactOptions& o
     for (int k = 0; k < pair.size(); ++k) sides[k < first ? 0 : 1] &= surface.friction_sides[pair.vertices[k]];
     for (std::size_t i = 0; i < options.friction_pairs.size(); ++i) {
       const auto is_of = [&](int end, int side) { return sides[end] >> (2 * i + side) & 1; };
-      if ((is_of(0, 0) && is_of(1, 1)) || (is_of(0, 1) && is_of(1, 0)))
-        return {options.friction_pairs[i].statics, options.friction_pairs[i].kinetic};
+      const bool is_first_a = is_of(0, 0) && is_of(1, 1);
+      if (!is_first_a && !(is_of(0, 1) && is_of(1, 0))) continue;
+      const FrictionPair& found = options.friction_pairs[i];
+      if (!found.has_two()) return {found.statics, found.kinetic};
+      return {found.largest(), std::max(found.kinetic, found.across->kinetic), &found, is_first_a};
     }
   }
   return {options.friction_coefficient, options.friction_coefficient};
@@ -131,10 +138,12 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
   is_primal_dual_ = false;
   lets_go_ = contact.law() == ContactLaw::adhesion;
   pairs_.clear();
+  FrictionDirections directions(contact.surface(), x);
   for (const auto& s : contact.active(x, workspace)) {
     if (s.is_mollified()) continue;
     const double held = options.adhesion.tangential_coefficient;
-    const auto [statics, kinetic] = lets_go_ ? Coefficients{held, held} : coefficients_of(s, options, contact.surface());
+    const auto found = lets_go_ ? Coefficients{held, held} : coefficients_of(s, options, contact.surface());
+    const double statics = found.statics;
     if (statics == 0) continue;
     const PairDistance<Dim> q = contact.distance(s, x);
     const double distance = std::sqrt(q.squared);
@@ -143,11 +152,15 @@ void FrictionEnergy<Dim>::renew(const ContactEnergy<Dim>& contact, ConstVectorVi
               .coefficients = Vec<kMost>::Zero(),
               .tangents = tangent_basis(Vec<Dim>(q.separation / distance)),
               .force = 0,
-              .kinetic = kinetic / statics};
+              .kinetic = found.kinetic / statics};
     std::copy(s.vertices.begin(), s.vertices.end(), pair.vertices.begin());
     pair.coefficients.template head<4>() = q.coefficients;
     pair.force = lets_go_ ? held * s.weight * options.adhesion.lagged_pull()
                           : statics * s.weight * contact.stiffness() * -contact.barrier_first(q.squared) * 2 * distance;
+    if constexpr (Dim == 3)
+      if (found.by_direction)
+        set_directions(pair, directions.at(s, q.coefficients, *found.by_direction, found.is_first_a),
+                       q.separation / distance, *found.by_direction);
     if (slips_from_touch) {
       constexpr double kTogether = 0.5;  // cosine: what slides past turns its normal by more
       const Vec<Dim> before = contact.distance(s, velocity_reference).separation.normalized();
@@ -167,6 +180,25 @@ void FrictionEnergy<Dim>::add(const std::vector<AveragedContact::PressedPoint>& 
                         .tangents = tangent_basis(point.normal),
                         .force = coefficient * point.force});
     }
+}
+
+/// Gives a pair the directions of two coefficients, and their parts of the larger one.
+template <int Dim>
+void FrictionEnergy<Dim>::set_directions(Pair& pair, const Vec<3>& direction, const Vec<3>& normal,
+                                         const FrictionPair& by_direction) const {
+  constexpr double kNormal = 1e-6;
+  const double along = by_direction.statics / by_direction.largest();
+  const double across = by_direction.across->statics / by_direction.largest();
+  const Vec<3> in_plane = direction - normal.dot(direction) * normal;
+  if (in_plane.norm() <= kNormal * direction.norm()) {
+    pair.force *= across;
+    return;
+  }
+  if constexpr (Dim == 3) {
+    pair.tangents.col(0) = along * in_plane.normalized();
+    pair.tangents.col(1) = across * normal.cross(in_plane).normalized();
+  }
+  pair.least = std::max(kLeastPart, std::min(along, across));
 }
 
 /// Relative motion of a pair along its `normal` at the reference, from there to where it is as near as dhat.
@@ -192,10 +224,11 @@ auto FrictionEnergy<Dim>::slip_velocity(const Pair& pair, ConstVectorView x) con
 template <int Dim>
 int FrictionEnergy<Dim>::count_let_go(ConstVectorView v, ConstVectorView x) const {
   return static_cast<int>(std::count_if(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
-    if (pair.kinetic == 1 || slip_velocity(pair, x).norm() < SlipLaw::kSlides * epsv_) return false;
+    const double eps = law_of(pair).eps;
+    if (pair.kinetic == 1 || slip_velocity(pair, x).norm() < SlipLaw::kSlides * eps) return false;
     Vec<Dim> relative = Vec<Dim>::Zero();
     for (int k = 0; k < pair.size; ++k) relative += pair.coefficients[k] * v.segment<Dim>(Dim * pair.vertices[k]);
-    return (pair.tangents.transpose() * relative).norm() < epsv_;
+    return (pair.tangents.transpose() * relative).norm() < eps;
   }));
 }
 

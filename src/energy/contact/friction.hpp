@@ -65,20 +65,25 @@ class FrictionEnergy final : public Energy {
  private:
   static constexpr int kTangents = Dim - 1;
   static constexpr int kMost = Dim == 2 ? AveragedContact::PressedPoint::kMost : 4;  ///< vertices of a pair
+  static constexpr double kLeastPart = 0.01;
   struct Pair {
     std::array<int, kMost> vertices;
     int size;
     Vec<kMost> coefficients;  ///< relative velocity = sum of coefficient * vertex velocity
+    /// Each times its coefficient's part of the larger one, where there are two; so are slip velocities.
     Eigen::Matrix<double, Dim, kTangents> tangents;
-    double force;                          ///< mu_s * normal force * weight [N]
+    double force;                          ///< mu_s * normal force * weight [N], of the larger mu_s
     double kinetic = 1;                    ///< mu_k by mu_s
+    double least = 1;                      ///< the smaller coefficient by the larger one, at least kLeastPart
     Vec<Dim> approach = Vec<Dim>::Zero();  ///< relative motion that is no slip [m]
     /// Slip velocity at the iterate [m/s], and friction by the most that it can be: as linearised, the second unknown.
     Vec<kTangents> slip = Vec<kTangents>::Zero(), ratio = Vec<kTangents>::Zero();
   };
   Vec<Dim> approach_of(const Pair& pair, const Vec<Dim>& normal, double dhat) const;
   Vec<kTangents> slip_velocity(const Pair& pair, ConstVectorView x) const;
-  SlipLaw law_of(const Pair& pair) const { return {epsv_, pair.kinetic, lets_go_}; }
+  void set_directions(Pair& pair, const Vec<3>& direction, const Vec<3>& normal, const FrictionPair& by_direction) const;
+  /// No direction of slip sticks up to more than eps_v.
+  SlipLaw law_of(const Pair& pair) const { return {pair.least * epsv_, pair.kinetic, lets_go_}; }
 
   std::vector<Pair> pairs_;
   double rate_ = 1;  ///< and the reference of VelocityRule

@@ -41,6 +41,7 @@ struct CollisionSurface {
   ClosedFaces closed;  ///< pairs that are no contact yet
   /// By problem vertex, which sides of ContactOptions::friction_pairs it is of: bits as FrictionSides has them. Empty: none.
   std::vector<std::uint64_t> friction_sides;
+  VectorX rest;  ///< positions [m], where a direction of friction turns with a surface; else empty
 
   std::shared_ptr<const Retraction> retraction{};  ///< 2D: null where gaps are not averaged
 

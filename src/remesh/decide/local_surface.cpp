@@ -170,6 +170,7 @@ void LocalProblem<Dim>::add_surface() {
   surface.friction_sides.clear();
   if (!state_.context.contact.friction_pairs.empty())
     for (const LocalVertex& v : vertices_) surface.friction_sides.push_back(friction_sides_of(v));
+  if (state_.context.contact.has_turning_friction()) surface.rest = rest_positions<Dim>(cells_);
   complete_collision_surface<Dim>(surface, points, cells_.rest);
 }
 
