@@ -179,7 +179,7 @@ Setup<3> pulled_block() {
   setup.contact.friction_pairs = {pair};
   setup.lagging_tolerance = 1e-4;
   setup.newton.step_tolerance = setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 0;
-  setup.time = {.dt = 0.01, .steps = 80};
+  setup.time = {.dt = 0.0025, .steps = 320};
   return setup;
 }
 
@@ -202,7 +202,7 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
   double began = 0;
   const auto velocity = [&] {
     const VectorX& v = simulation.state().history.v[0];
-    const Vec<3> mean = sum<3>(v) / (static_cast<double>(v.size()) / 3);
+    const Vec<3> mean = sum<3>(v) / setup.mesh.num_vertices();  // the table rests
     return Vec<2>(mean[0], mean[2]);
   };
   while (!simulation.finished()) {
@@ -219,7 +219,7 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
     }
   }
   EXPECT_GE(pull_at(began), most);
-  EXPECT_LE(pull_at(began), most + 3 * kPullRate * setup.time.dt);
+  EXPECT_LE(pull_at(began), most + 8 * kPullRate * setup.time.dt);
   const Vec<2> expected = predicted(kFlat + most / kPullRate, simulation.state().t);
   EXPECT_LE((velocity() - expected).norm(), 0.02 * expected.norm())
       << velocity().transpose() << ", " << expected.transpose();
