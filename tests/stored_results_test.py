@@ -7,6 +7,7 @@ import csv
 import fnmatch
 import importlib.util
 import json
+import math
 import pathlib
 import re
 import sys
@@ -128,6 +129,23 @@ class Stored(unittest.TestCase):
         self.assertEqual((folder / "paper/studies.md").read_text(), studies.page())
         self.assertEqual((folder / "stability/table.md").read_text(), stability.table(stability.read(folder / "stability/results.csv")))
         self.assertEqual((folder / "needs/table.md").read_text(), needs.table(needs.read(folder / "needs/results.csv")))
+
+    def test_page_of_peers(self):
+        folder = SOURCE / "verification/peers"
+        sys.path.insert(0, str(folder))
+        page = load("peers/page.py")
+        rows, references = ([*csv.DictReader((folder / name).read_text().splitlines())] for name in ("results.csv", "references.csv"))
+        text = (folder / "README.md").read_text()
+        for table in (page.equal_table(rows, references), page.references_table(references), page.runs_table(rows)):
+            self.assertIn(table, text)
+        self.assertIn("In {1} of these {0} rows".format(*page.count_first(rows, references)), text)
+        # An error that is small by chance counts as much as that of the next finer mesh.
+        levels = [("0.1", "0.2"), ("1", "-0.001"), ("10", "0.05")]
+        made = [{"case": "ring", "code": "ITR", "elements": "linear", "processor_seconds": s, "error": e} for s, e in levels]
+        self.assertEqual(page.series(made, "ring")["ITR", "linear"], [(0.1, 0.2), (1, 0.05), (10, 0.05)])
+        self.assertAlmostEqual(page.seconds_for([(0.1, 0.2), (1, 0.05)], 0.1), math.sqrt(0.1))
+        self.assertEqual(page.seconds_for([(0.1, 0.2), (1, 0.05)], 0.3), 0.1)
+        self.assertIsNone(page.seconds_for([(0.1, 0.2), (1, 0.05)], 0.01))
 
     def test_counts_what_changed_since(self):
         if stored.git("rev-parse", "HEAD~5") is None:
