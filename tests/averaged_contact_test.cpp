@@ -86,6 +86,18 @@ TEST(AveragedContact, HasTheDerivativesOfItsEnergy) {
   }
 }
 
+TEST(AveragedContact, FindsGapsAnewWherePositionsChange) {
+  const Lines lines = disc_on_line();
+  const CollisionSurface surface = lines.surface(0.02, 0.06);
+  const AveragedContact contact(surface, 1);
+  const VectorX x = lines.positions(), moved = 1.001 * x;
+  Workspace used, fresh;
+  const double at_x = contact.value(x, used);
+  EXPECT_EQ(contact.value(moved, used), contact.value(moved, fresh));
+  EXPECT_EQ(contact.value(x, used), at_x);
+  EXPECT_NE(contact.value(moved, used), at_x);
+}
+
 TEST(AveragedContact, ForcesAndMomentsAddUpToNothing) {
   const Lines lines = disc_on_line();
   const CollisionSurface surface = lines.surface(0.02, 0.06);

@@ -101,7 +101,7 @@ def torques(context, around):
         "output": {"forces": [{"name": "ring", "surfaces": 1}], "paraview": {"skip_frame": 20}}}
     run = run_scene(context, f"bore-{around}", content)
     with open(run.folder / "forces.csv", encoding="utf-8") as file:
-        return np.array([float(row["reaction_moment"]) for row in csv.DictReader(file) if float(row["t"]) > 6])
+        return np.array([float(row["reaction_moment"]) for row in csv.DictReader(file) if float(row["t"]) > 10])
 
 
 class Ironed:
