@@ -57,7 +57,7 @@ class Examples(unittest.TestCase):
 
     def test_pages_have_the_stored_table(self):
         self.assertIn(study.table(), (RUBBER / "README.md").read_text())
-        for name in make.PARTS:
+        for name in study.CASES:
             with open(study.STUDY / f"{name}.csv", newline="") as file:
                 errors = [abs(float(row["error [%]"])) for row in csv.DictReader(file)]
             self.assertLess(errors[-1], 3, name)

@@ -26,6 +26,7 @@ OGDEN = {"type": "Ogden", "mus": [0.63, 0.0012, -0.01], "alphas": [1.3, 5, -2], 
 YEOH = {"type": "Yeoh", "C": [0.31237, 5.4257e-4, 6.962e-5], "K": 1000}
 BUSHING = {"type": "NeoHookean", "E": 1.8, "nu": 0.4997}
 CORD = 3.53
+FLUID = "0.6 * min(max(t - 1, 0), 1)"
 # Edge, lip and garter side of the shaft seal, its membrane, and the rim that is bonded to a metal ring: r, z, edges by h.
 LIP = [(24.4, 0, 0.3), (25.6, -1.4), (27.2, -1.6), (28.2, -1), (28.6, 3.4), (29.2, 5), (32, 5), (32, 7), (28.2, 7),
        (26.8, 5.6), (26.4, 1.6), (25.6, 1)]
@@ -197,6 +198,26 @@ PARTS = {
         "time": quasistatic(20, 2),
         "output": {"forces": [{"name": "lid", "obstacles": "lid"}],
                    "paraview": {"options": {"contact_pressure": True, "hydrostatic_pressure": True}}},
+    }, ("wall", "lid")),
+    # A fluid of 0.6 MPa comes along the surface of that cord from the left. The lid opens from t = 2 on.
+    "oring_leak": Part("cord", {"surface_selection": [
+        {"id": "inlet", "box": [[-2, 1e-3], [-1.4, 1]]},
+        {"id": "outlet", "box": [[1.4, 1e-3], [2, 1]]},
+        {"id": "middle", "box": [[-2, -1], [2, 1e-3]]},
+        {"id": "top", "box": [[-2, 1e-3], [2, 2]]},
+    ]}, {
+        "materials": YEOH,
+        "contact": {"enabled": True},
+        "boundary_conditions": {
+            "dirichlet_boundary": [{**held("middle", 0, 0), "dimension": [False, True]}],
+            "obstacle_displacements": [{"id": "lid", "value": [0, "-0.42 * min(t, 1) + max(t - 2, 0)"]}],
+            "pressure_boundary": [
+                {"id": "inlet", "value": FLUID},
+                {"id": "top", "value": FLUID, "penetrates": True, "from": "inlet", "leaks_to": "outlet"},
+            ],
+        },
+        "time": quasistatic(54, 2.7),
+        "output": {"forces": [{"name": "lid", "obstacles": "lid"}], "paraview": {"options": {"contact_pressure": True}}},
     }, ("wall", "lid")),
     "seal_ogden": seal(OGDEN),
     "seal_yeoh": seal(YEOH),

@@ -18,7 +18,12 @@ import subprocess
 import sys
 
 import h5py
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
 from PIL import Image
 
 import make  # finds modules of the folder above
@@ -58,6 +63,12 @@ def sealing_margin(run):
     with h5py.File(sorted((run / "frames").glob("*.h5"))[-1]) as file:
         x, pressure = file["/fields/x"][:], file["/fields/contact_pressure"][:]
     return pressure[x[:, 1] > 1.3].max() - 5
+
+
+def rise_at_leak(run):
+    """Of the lid from t = 2 on, to a step."""
+    steps = [json.loads(line) for line in (run / "steps.jsonl").read_text().splitlines()]
+    return next(step["t"] for step in steps if step.get("leaks", 0) > 0) - 2
 
 
 @dataclasses.dataclass
@@ -174,6 +185,23 @@ def draw(runs):
     page.quantize(96).save(HERE / "rubber.png", optimize=True)
 
 
+def draw_leak(run):
+    """Closed, under pressure, before and after the leak; wet facets are black: oring_leak.png."""
+    leak = round((2 + rise_at_leak(run)) / 0.05)
+    figure, axes = plt.subplots(1, 4, figsize=(12, 2), layout="constrained")
+    for axis, step in zip(axes, (20, 40, leak - 1, leak)):
+        with h5py.File(run / "frames" / f"{step:06d}.h5") as file:
+            x, cells, surface = file["/fields/x"][:], file["/mesh/simplices"][:], file["/mesh/surface"][:]
+            wet = [surface[file[f"/sets/facets/{name}"][:]] for name in ("inlet", "wet top") if f"/sets/facets/{name}" in file]
+            walls, corners = file["/obstacles/edges"][:], file["/obstacles/x"][:]
+        axis.add_collection(PolyCollection(x[cells], facecolor="#f2d9b3", edgecolor="#b08d57", linewidth=0.4))
+        axis.add_collection(LineCollection(x[np.concatenate(wet)], color="black", linewidth=3))
+        axis.add_collection(LineCollection(corners[walls], color="grey", linewidth=2))
+        axis.set(title=f"t = {step * 0.05:g} s", xlim=(-3, 2.6), ylim=(-0.1, 2.3), aspect="equal")
+        axis.axis("off")
+    figure.savefig(HERE / "oring_leak.png", dpi=90)
+
+
 def table():
     lines = ["| scene | result | h [mm] | values | reference | error of the finest | longest run |",
              "|---|---|---|---|---|---|---|"]
@@ -204,6 +232,9 @@ def main():
     studies.write_table(HERE / "README.md", table())
     if options.pictures:
         draw(options.runs)
+        make.write(options.runs, ["oring_leak"], 1)
+        run(options, options.runs / "oring_leak.json", options.runs / "oring_leak")
+        draw_leak(options.runs / "oring_leak")
 
 
 if __name__ == "__main__":
