@@ -34,8 +34,10 @@ STORED = {
     "verification/peers/references.csv": CODE,
     **{str(path.relative_to(ROOT)): CODE for path in sorted([*PAPER.glob("*/study.json"), *PAPER.glob("*/steps.csv")])},
 }
-# Tables that the report's cases and the studies write beside what STORED names, and runs that have a made of their own.
-BESIDE = ("verification/report/*.csv", "verification/paper/*/study.csv")
+# Tables that the report's cases and the studies write beside what STORED names, and runs that have a made of their own. Results of
+# other codes depend on none of these sources.
+BESIDE = ("verification/report/*.csv", "verification/paper/*/study.csv", "verification/hard_contact/results-calculix.csv",
+          "verification/hard_contact/results-getfem.csv")
 
 
 def git(*arguments):
