@@ -42,7 +42,7 @@ class AveragedContact final : public Energy {
     Vec<3> hats;       ///< of the piece's owners
     double width;      ///< the largest of its owners
   };
-  /// What a point sees of other curves.
+  /// Distance of a point to other curves, as it enters the averages.
   struct Gap {
     double value = 0, first = 0, second = 0;  ///< bounded from above, and its derivatives by the distance
     double distance = 0;
