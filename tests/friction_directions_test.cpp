@@ -211,7 +211,8 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
     const State<3>& state = simulation.state();
     const VectorX friction = asked(simulation).forces.friction;
     EXPECT_LE(friction.dot((state.history.x[0] - x).head(friction.size())), 1e-15) << state.step;
-    if (began == 0 && velocity().norm() > 10 * setup.contact.friction_velocity) {
+    const bool has_settled = state.t > kFlat + 0.1;  // on the table
+    if (began == 0 && has_settled && velocity().norm() > 10 * setup.contact.friction_velocity) {
       began = state.t;
       const Vec<2> v = velocity(),
                    steep(std::cos(kPullAngle) / (kAlong * kAlong), std::sin(kPullAngle) / (kAcross * kAcross));
@@ -219,7 +220,7 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
     }
   }
   EXPECT_GE(pull_at(began), most);
-  EXPECT_LE(pull_at(began), most + 8 * kPullRate * setup.time.dt);
+  EXPECT_LE(pull_at(began), most + 12 * kPullRate * setup.time.dt);
   const Vec<2> expected = predicted(kFlat + most / kPullRate, simulation.state().t);
   EXPECT_LE((velocity() - expected).norm(), 0.02 * expected.norm())
       << velocity().transpose() << ", " << expected.transpose();

@@ -10,6 +10,8 @@
 #include <limits>
 #include <numbers>
 #include <set>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/connected_parts.hpp"
@@ -213,28 +215,7 @@ void add_proxy(Setup<2>& setup, const Polylines& lines, const std::vector<double
   setup.proxy = std::move(proxy);
 }
 
-}  // namespace
-
-template <int Dim>
-bool averaging_helps(const Setup<Dim>& setup) {
-  if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia() || setup.fields.error_bars)
-    return false;
-  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
-  std::set<int> of_bodies, held_bodies;
-  for (const CellId c : setup.mesh.live_cells()) {
-    const int body = setup.mesh.body(c);
-    of_bodies.insert(body);
-    for (const VertexId v : setup.mesh.cell(c))
-      if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
-        held_bodies.insert(body);
-  }
-  return of_bodies == held_bodies;
-}
-template bool averaging_helps(const Setup<2>&);
-template bool averaging_helps(const Setup<3>&);
-
-template <>
-std::string retract_surfaces(Setup<2>& setup) {
+std::string retract(Setup<2>& setup) {
   if (setup.proxy) return {};
   const Polylines lines(setup);
   std::vector<double> sag(lines.rest().size());
@@ -258,9 +239,36 @@ std::string retract_surfaces(Setup<2>& setup) {
       units.text(largest, "m", 3), units.text(deepest, "m", 3));
 }
 
-template <>
-std::string retract_surfaces(Setup<3>&) {
+}  // namespace
+
+template <int Dim>
+bool averaging_helps(const Setup<Dim>& setup) {
+  if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia() || setup.fields.error_bars)
+    return false;
+  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
+  std::vector<std::array<int, Dim + 1>> cells;
+  for (const CellId c : setup.mesh.live_cells()) cells.push_back(setup.mesh.cell(c));
+  const std::vector<int> part =
+      connected_parts<Dim + 1>(setup.mesh.node_slots(), std::span<const std::array<int, Dim + 1>>(cells));
+  std::set<int> parts, held_parts;
+  for (const auto& cell : cells)
+    for (const VertexId v : cell) {
+      parts.insert(part[v]);
+      if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
+        held_parts.insert(part[v]);
+    }
+  return parts == held_parts;
+}
+
+template <int Dim>
+std::string retract_surfaces(Setup<Dim>& setup) {
+  if constexpr (Dim == 2) return retract(setup);
   return {};
 }
+
+#define ITR_INSTANTIATE(Dim)                        \
+  template bool averaging_helps(const Setup<Dim>&); \
+  template std::string retract_surfaces(Setup<Dim>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr
