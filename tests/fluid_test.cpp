@@ -391,6 +391,17 @@ TEST(Fluid, ResultantsKnowSurfacesThatAreAllWet) {
   EXPECT_NEAR(resultant<2>(simulation, tags, Vec<2>::Zero()).force[1], 5e4, 1);
 }
 
+TEST(Fluid, LeaksToWhereAnotherFluidIs) {
+  constexpr int kWetRight = 15;
+  itr::Setup<2> setup = seal<2>(4, 1, [](const Vec<2>&, double) { return 0.0; });
+  setup.fluids.push_back({.place = "the other fluid", .wet = {{kRight, kWetRight}}});
+  for (const FacetId f : setup.mesh.live_facets()) {
+    if (setup.mesh.facet_tag(f) == kBottom) setup.mesh.set_facet_tag(f, kWet);
+    if (setup.mesh.facet_tag(f) == kRight) setup.mesh.set_facet_tag(f, kWetRight);
+  }
+  EXPECT_EQ(reach_of_fluids(setup, setup.mesh).leaks, (std::vector<char>{1, 0}));
+}
+
 TEST(Fluid, RefusesWhatCannotCome) {
   const auto place_of = [](const std::function<void(itr::Setup<2>&)>& change) {
     auto setup = seal<2>(4, 1e4, [](const Vec<2>&, double) { return 0.0; });

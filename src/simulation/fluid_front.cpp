@@ -66,7 +66,7 @@ class FluidSurface {
   /// Follows the tags of the mesh, which must outlive this, as `setup` and its `fluid`.
   FluidSurface(const StepSetup<Dim>& setup, const Fluid& fluid, const Mesh<Dim>& mesh)
       : setup_(setup), fluid_(fluid), mesh_(mesh), tag_(mesh.facet_slots(), kNoTag) {
-    for (const FacetId f : mesh.live_facets()) tag_[f] = tag_without(fluid, mesh.facet_tag(f));
+    for (const FacetId f : mesh.live_facets()) tag_[f] = tag_without_fluid(setup.fluids, mesh.facet_tag(f));
   }
 
   bool has(FacetId f) const { return fluid_.wet.contains(tag_[f]); }
@@ -123,7 +123,7 @@ class FluidSurface {
   const StepSetup<Dim>& setup_;
   const Fluid& fluid_;
   const Mesh<Dim>& mesh_;
-  std::vector<int> tag_;  ///< by facet, as it is without a fluid
+  std::vector<int> tag_;  ///< by facet, as it is without any fluid
 };
 
 /// Leaves the facets that contact shuts, and those that are cut off from the source. Returns whether there are any.
