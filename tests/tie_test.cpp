@@ -537,6 +537,19 @@ TEST(Tie, PeriodicCellsOfOneMaterialHaveTheMacroscopicGradient) {
   expect_uniform_cell<3>(2, 3, 1);
 }
 
+TEST(Tie, PeriodicCellsFailWhereConditionsHoldAnotherJump) {
+  Mat<2> gradient = Mat<2>::Zero();
+  gradient(0, 0) = 0.1;
+  Plane setup = periodic_cell<2>(gradient, 2, 2);
+  for (const int tag : {kRight, kLeft})
+    setup.dirichlet.push_back({tag, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }});
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  const StepResult result = simulation.advance();
+  EXPECT_FALSE(result.ok);
+  EXPECT_NE(result.reason.find("stay apart by 0.1 m"), std::string::npos) << result.reason;
+}
+
 /// The traction on the right or the upper side of a laminate.
 Vec<2> traction_of_laminate(const Mat<2>& gradient, bool is_right) {
   Plane setup = periodic_cell<2>(gradient, 3, 4);

@@ -204,8 +204,11 @@ void TieEnergy<Dim>::update(const Increment& at) {
 
 template <int Dim>
 std::string TieEnergy<Dim>::describe(const Increment& at, const Units& units) const {
+  const VectorX x = at.base + at.d;
+  double largest = 0;
+  for (const Row& row : rows_) largest = std::max(largest, gap(row, x).norm() / row.of->measure);
   return fmt::format("tied surfaces stay apart by {}: conditions may hold both sides in different places",
-                     units.text(largest_gap(VectorX(at.base + at.d - rest_)), "m", 3));
+                     units.text(largest, "m", 3));
 }
 
 template <int Dim>
@@ -252,9 +255,8 @@ std::vector<TractionOfTie<Dim>> TieEnergy<Dim>::tractions() const {
     const auto field = std::make_shared<MultiplierField<Dim>>(std::move(facets), boxes);
     for (int side = 0; side < 2; ++side)
       for (const int tag : mortar.tags[side])
-        tractions.emplace_back(
-            tag, [field, sign = side == 0 ? -1.0 : 1.0, shift = Vec<Dim>(side == 0 ? 0 * mortar.to_own : mortar.to_own)](
-                     const RestPoint<Dim>& X) { return Vec<Dim>(sign * (*field)(X + shift)); });
+        tractions.emplace_back(tag, [field, sign = side == 0 ? -1.0 : 1.0, shift = Vec<Dim>(side * mortar.to_own)](
+                                        const RestPoint<Dim>& X) { return Vec<Dim>(sign * (*field)(X + shift)); });
   }
   return tractions;
 }
