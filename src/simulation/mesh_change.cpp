@@ -2,6 +2,7 @@
 #include "itr/transfer.hpp"
 
 #include <limits>
+#include <optional>
 
 #include "fem/locator.hpp"
 #include "geometry/bvh.hpp"
@@ -50,15 +51,15 @@ class LostFacets {
     tree_.build(boxes);
   }
 
-  /// The nearest one with this tag that looks to the same side of the same connected part; kNoTag: with any tag.
-  FacetId find(const RestPoint<Dim>& X, int tag) const {
+  /// The nearest one with this tag (empty: with any) that looks to the same side of the same connected part.
+  FacetId find(const RestPoint<Dim>& X, std::optional<int> tag) const {
     std::vector<int> hits;
     tree_.query({X, X}, hits);
     FacetId nearest = kNone;
     double least = std::numeric_limits<double>::infinity();
     for (const int i : hits) {
       const auto& facet = before_.facet(lost_[i]);
-      if (tag != kNoTag && before_.facet_tag(lost_[i]) != tag) continue;
+      if (tag && before_.facet_tag(lost_[i]) != *tag) continue;
       if (before_.part_of_vertex(facet[0]) != X.part) continue;
       if (inward_normal(rest_of(before_, facet)).dot(X.inward) <= 0) continue;
       const double distance = squared_distance(X, before_, lost_[i]);
@@ -126,7 +127,8 @@ MeshChange<Dim> describe_change(const Mesh<Dim>& before, const Mesh<Dim>& mesh, 
     for (const int v : mesh.facet(f)) middle += mesh.rest(v) / Dim;
     const RestPoint<Dim> point(middle, inward_normal(rest_of(mesh, mesh.facet(f))), mesh.part_of_vertex(mesh.facet(f)[0]));
     change.facet_parent[f] = lost.find(point, mesh.facet_tag(f));
-    if (change.facet_parent[f] == kNone) change.facet_parent[f] = lost.find(point, kNoTag);  // a fluid has come or gone
+    if (change.facet_parent[f] == kNone)
+      change.facet_parent[f] = lost.find(point, std::nullopt);  // a fluid has come or gone
   }
 
   std::vector<VertexId> stayed(mesh.num_vertices(), kNone);
