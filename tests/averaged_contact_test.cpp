@@ -167,6 +167,9 @@ TEST(AveragedContact, IsChosenWhereBodiesSlideThatConditionsHold) {
   other = two_rings();
   other.remesh.enabled = true;
   EXPECT_FALSE(is_chosen(other));
+  other = two_rings();
+  other.fluids = {{.place = "the fluid", .wet = {{1, 7}}}};
+  EXPECT_FALSE(is_chosen(other)) << "part of the forces is inside of bodies, where no facet has a pressure of it";
 }
 
 TEST(AveragedContact, ActsOfASurfaceInsideOfTheBodies) {

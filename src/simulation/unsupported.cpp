@@ -50,8 +50,9 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
     {{"/contact/average_gaps",
       "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with a collision mesh, "
-      "friction "
-      "by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies or the plain form of contact"},
+      "friction by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies, fluids that penetrate or "
+      "the "
+      "plain form of contact"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !can_average_gaps(setup); }},
     {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},
@@ -179,7 +180,7 @@ bool can_average_gaps(const Setup<Dim>& setup) {
   const bool has_other_surface = (setup.proxy && !setup.proxy->retraction) || contact.resolve_overlap || !setup.ties.empty();
   return Dim == 2 && contact.convergent && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup) &&
          !has_other_surface && contact.friction_pairs.empty() && !contact.has_adhesion() && !damps &&
-         !has_rigid_bodies(setup.materials);
+         !has_rigid_bodies(setup.materials) && setup.fluids.empty();
 }
 
 template <int Dim>
