@@ -12,6 +12,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/connected_parts.hpp"
@@ -53,6 +54,26 @@ struct Corner {
   }
 };
 
+/// The largest value of each of several parts, as others see it.
+class LargestByPart {
+ public:
+  void include(int part, double value) {
+    if (part == part_) {
+      largest_ = std::max(largest_, value);
+    } else if (value > largest_) {
+      second_ = std::exchange(largest_, value);
+      part_ = part;
+    } else {
+      second_ = std::max(second_, value);
+    }
+  }
+  double of_others(int part) const { return part == part_ ? second_ : largest_; }
+
+ private:
+  double largest_ = 0, second_ = 0;  ///< of one part, and of all others
+  int part_ = kNone;
+};
+
 /// The polylines of the bodies' boundary and of the obstacles, by vertex: those of the mesh come first.
 class Polylines {
  public:
@@ -83,18 +104,12 @@ class Polylines {
     curvature_ = largest_by_part([&](int v) { return corners_[v].curvature; });
   }
 
-  /// The largest of other parts' values, of which there is one a vertex.
-  double largest_of_others(int v, const std::vector<double>& by_part) const {
-    double largest = 0;
-    for (int part = 0; part < std::ssize(by_part); ++part)
-      if (part != part_[v]) largest = std::max(largest, by_part[part]);
-    return largest;
-  }
-  /// By part, the largest value f(v) of its vertices.
+  double largest_of_others(int v, const LargestByPart& by_part) const { return by_part.of_others(part_[v]); }
+  /// The largest value f(v) >= 0 of each part's vertices.
   template <typename F>
-  std::vector<double> largest_by_part(const F& f) const {
-    std::vector<double> largest(1 + *std::max_element(part_.begin(), part_.end()), 0);
-    for (std::size_t v = 0; v < part_.size(); ++v) largest[part_[v]] = std::max(largest[part_[v]], f(static_cast<int>(v)));
+  LargestByPart largest_by_part(const F& f) const {
+    LargestByPart largest;
+    for (std::size_t v = 0; v < part_.size(); ++v) largest.include(part_[v], f(static_cast<int>(v)));
     return largest;
   }
   /// How far the edges at v may be from the smooth surfaces that they and others stand for [m].
@@ -125,7 +140,7 @@ class Polylines {
   std::vector<std::array<int, 2>> edges_;
   std::size_t num_facets_ = 0;
   std::vector<int> part_;
-  std::vector<double> curvature_;  ///< the largest, by part
+  LargestByPart curvature_;
 };
 
 /// The point `depth` behind a vertex of the boundary, or as far as kMostOfCell allows: weights of the vertices of its cell.
@@ -205,7 +220,7 @@ void add_proxy(Setup<2>& setup, const Polylines& lines, const std::vector<double
     retraction.rest.push_back(setup.obstacles.rest[o]);
   }
   retraction.width.assign(retraction.depth.size(), 0);
-  const std::vector<double> deepest =
+  const LargestByPart deepest =
       lines.largest_by_part([&](int v) { return v < vertices && own[v] != kNone ? retraction.depth[own[v]] : 0.0; });
   for (int v = 0; v < vertices; ++v)
     if (own[v] != kNone && retraction.depth[own[v]] > 0)
@@ -224,7 +239,7 @@ std::string retract(Setup<2>& setup) {
     sag[v] = lines.sag(v);
     largest = std::max(largest, sag[v]);
   }
-  const std::vector<double> by_part = lines.largest_by_part([&](int v) { return sag[v]; });
+  const LargestByPart by_part = lines.largest_by_part([&](int v) { return sag[v]; });
   for (int v = 0; v < static_cast<int>(sag.size()); ++v)
     of_others = std::max(of_others, sag[v] + lines.largest_of_others(v, by_part));
   const Units& units = setup.units;
