@@ -226,6 +226,26 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
       << velocity().transpose() << ", " << expected.transpose();
 }
 
+TEST(FrictionDirections, AreCheckedWhereAProgramGivesThem) {
+  const auto place_of = [](double kinetic_along, const FrictionAcross& across) {
+    itr::Setup<3> setup = pulled_block();
+    setup.contact.friction_pairs[0].kinetic = kinetic_along;
+    setup.contact.friction_pairs[0].across = across;
+    try {
+      setup.validate();
+    } catch (const InputError& error) {
+      return error.parts().place;
+    }
+    return std::string("none");
+  };
+  const Vec<3> x = Vec<3>::UnitX();
+  EXPECT_EQ(place_of(kAlong / 2, {.statics = kAcross, .kinetic = kAcross / 2, .direction = x}), "none");
+  EXPECT_EQ(place_of(kAlong / 2, {.statics = kAlong, .kinetic = kAlong, .direction = x}),
+            "/contact/friction_pairs/0/kinetic");
+  EXPECT_EQ(place_of(kAlong / 2, {.statics = 0, .kinetic = 0.1, .direction = x}), "/contact/friction_pairs/0/kinetic");
+  EXPECT_EQ(place_of(kAlong / 2, {.statics = kAcross, .kinetic = kAcross / 2}), "/contact/friction_pairs/0/direction");
+}
+
 }  // namespace
 
 namespace scene {

@@ -59,11 +59,13 @@ void check_across(const std::string& place, const FrictionPair& pair, int dim) {
   const FrictionAcross& across = *pair.across;
   require_not_negative(place + "/static", across.statics);
   require_not_negative(place + "/kinetic", across.kinetic);
-  if (!pair.has_two()) return;
+  require(across.kinetic <= across.statics, place + "/kinetic", across.kinetic,
+          fmt::format("at most the static coefficient, {}", across.statics));
   constexpr double kSameRatio = 1.001e-3;
   require(
       std::abs(pair.kinetic * across.statics - across.kinetic * pair.statics) <= kSameRatio * pair.statics * across.statics,
       place + "/kinetic", across.kinetic, "kinetic by static as the same ratio in both directions");
+  if (!pair.has_two()) return;
   if (dim == 2) refuse(place, "two coefficients", "one coefficient: in the plane, surfaces slide along one line only");
   require_positive(place + "/direction", across.direction.norm());
 }
