@@ -114,7 +114,7 @@ class Deck:
         forces = {}
         for (c, f), ends in zip(where, corners):
             length = np.linalg.norm(points[ends[1]] - points[ends[0]])
-            nodes = [*ends] + ([cells[c][3 + f]] if self.order == 2 and f < 2 else [cells[c][5]] if self.order == 2 else [])
+            nodes = [*ends] + ([cells[c][3 + f]] if self.order == 2 else [])
             for node, share in zip(nodes, shares):
                 forces[node] = forces.get(node, 0) + share * length * np.array(load.traction)
         return ["*CLOAD"] + [f"{self.first[load.body] + n}, {axis + 1}, {force[axis]:.12g}"
