@@ -33,10 +33,12 @@ struct Lines {
       if (i + 1 < count || is_closed) edges.push_back({first + i, first + (i + 1) % count});
     }
   }
-  CollisionSurface surface(double depth, double width) const {
+  /// `uneven`: by which part of `depth` depths differ.
+  CollisionSurface surface(double depth, double width, double uneven = 0) const {
     CollisionSurface result = make_collision_surface<2>(edges, {}, {}, rest, std::vector<char>(rest.size(), 1));
     Retraction retraction;
-    retraction.depth.assign(rest.size(), depth);
+    for (std::size_t i = 0; i < rest.size(); ++i)
+      retraction.depth.push_back(depth * (1 + uneven * std::sin(3.0 * static_cast<double>(i))));
     retraction.width.assign(rest.size(), width);
     retraction.is_corner = is_corner;
     retraction.rest = rest;
@@ -74,15 +76,17 @@ Lines disc_on_line() {
 
 TEST(AveragedContact, HasTheDerivativesOfItsEnergy) {
   const Lines lines = disc_on_line();
-  const CollisionSurface surface = lines.surface(0.02, 0.06);
-  for (std::uint64_t seed = 1; seed < 6; ++seed) {
-    VectorX x = lines.positions();
-    for (Eigen::Index i = 0; i < x.size(); ++i) x[i] += 0.004 * noise(1000 * seed + static_cast<std::uint64_t>(i));
-    const AveragedContact contact(surface, 0.7);
-    Workspace workspace;
-    ASSERT_GT(contact.value(x, workspace), 0);
-    expect_derivatives(contact, x, 1e-7, 2e-5);
-    expect_psd(contact, x);
+  for (const double uneven : {0.0, 0.3}) {
+    const CollisionSurface surface = lines.surface(0.02 * (1 + uneven), 0.06, uneven);
+    for (std::uint64_t seed = 1; seed < 6; ++seed) {
+      VectorX x = lines.positions();
+      for (Eigen::Index i = 0; i < x.size(); ++i) x[i] += 0.004 * noise(1000 * seed + static_cast<std::uint64_t>(i));
+      const AveragedContact contact(surface, 0.7);
+      Workspace workspace;
+      ASSERT_GT(contact.value(x, workspace), 0);
+      expect_derivatives(contact, x, 1e-7, 2e-5);
+      expect_psd(contact, x);
+    }
   }
 }
 

@@ -55,6 +55,45 @@ struct BoundedGap {
   }
 };
 
+/// Coefficients of 1, t, t^2 of the depth along a piece.
+Vec<3> depths_along(const CurvePiece& piece, const Retraction& retraction) {
+  Vec<3> depths = Vec<3>::Zero();
+  for (int k = 0; k < 3; ++k) depths += retraction.depth[piece.owners[k]] * piece.hats.row(k).transpose();
+  return depths;
+}
+
+/// The t in [0, 1] with the least distance from q less depth: there the gap has the derivatives of a fixed t.
+double nearest_less_depth(const PlacedPiece& piece, const Vec<3>& depths, const Vec<2>& q) {
+  constexpr int kMostIterations = 60;
+  double t = piece.nearest(q);
+  if (depths[1] == 0 && depths[2] == 0) return t;
+  const auto slope = [&](double s) {
+    return (piece.at(s) - q).normalized().dot(piece.c[1] + 2 * s * piece.c[2]) - depths[1] - 2 * s * depths[2];
+  };
+  double low = 0, high = 1;
+  if (slope(t) > 0) {
+    high = t;
+    if (slope(low) >= 0) return low;
+  } else {
+    low = t;
+    if (slope(high) <= 0) return high;
+  }
+  for (int k = 0; k < kMostIterations; ++k) {
+    const double value = slope(t);
+    if (value == 0) break;
+    (value > 0 ? high : low) = t;
+    const Vec<2> away = piece.at(t) - q, tangent = piece.c[1] + 2 * t * piece.c[2];
+    const double distance = away.norm(), along = away.dot(tangent) / distance;
+    const double bend = (tangent.squaredNorm() - along * along + 2 * away.dot(piece.c[2])) / distance - 2 * depths[2];
+    double next = t - value / bend;
+    if (!(next > low && next < high)) next = (low + high) / 2;
+    const bool is_same = std::abs(next - t) <= 1e-15;
+    t = next;
+    if (is_same) break;
+  }
+  return t;
+}
+
 }  // namespace
 
 /// The gaps at the positions that were asked for last.
@@ -87,10 +126,7 @@ AveragedContact::AveragedContact(const CollisionSurface& surface, double scale)
 }
 
 double AveragedContact::depth(const CurvePiece& piece, double t) const {
-  const Vec<3> hats = piece.hats * CurvePiece::powers(t);
-  double depth = 0;
-  for (int k = 0; k < 3; ++k) depth += hats[k] * retraction_->depth[piece.owners[k]];
-  return depth;
+  return depths_along(piece, *retraction_).dot(CurvePiece::powers(t));
 }
 
 /// All pieces at some positions, in a tree.
@@ -106,6 +142,7 @@ class AveragedContact::GapFinder {
       boxes.back().include(placed.c[0] + placed.c[1] / 2);
       boxes.back().include(placed.at(1));
       placed_.push_back(placed);
+      depths_.push_back(depths_along(piece, *contact.retraction_));
     }
     tree_.build(boxes);
     for (const double depth : contact.retraction_->depth) deepest_ = std::max(deepest_, depth);
@@ -119,12 +156,14 @@ class AveragedContact::GapFinder {
     tree_.query(Box<2>{q, q}.inflated(most + 2 * deepest_), near);
     std::sort(near.begin(), near.end());
     Gap gap;
-    gap.distance = std::numeric_limits<double>::infinity();
+    double least = std::numeric_limits<double>::infinity();
     for (const int i : near) {
       if (!sees(own, contact_.pieces_[i])) continue;
-      const double t = placed_[i].nearest(q);
+      const double t = nearest_less_depth(placed_[i], depths_[i], q);
       const Vec<2> separation = q - placed_[i].at(t);
-      if (const double distance = separation.norm(); distance < gap.distance) {
+      const double distance = separation.norm();
+      if (const double left = distance - depths_[i].dot(CurvePiece::powers(t)); left < least) {
+        least = left;
         gap.distance = distance;
         gap.foot = i;
         gap.t = t;
@@ -132,8 +171,7 @@ class AveragedContact::GapFinder {
       }
     }
     double value = most;
-    if (gap.foot != kNone)
-      value = gap.distance - contact_.depth(own, point.t) - contact_.depth(contact_.pieces_[gap.foot], gap.t);
+    if (gap.foot != kNone) value = least - contact_.depth(own, point.t);
     const BoundedGap bounded(value, most);
     gap.value = bounded.value;
     gap.first = bounded.first;
@@ -150,6 +188,7 @@ class AveragedContact::GapFinder {
 
   const AveragedContact& contact_;
   std::vector<PlacedPiece> placed_;
+  std::vector<Vec<3>> depths_;  ///< as depths_along() has them
   Bvh<2> tree_;
   double deepest_ = 0;
 };
@@ -274,23 +313,25 @@ void AveragedContact::add_hessian_of_averages(const std::vector<Gap>& gaps, cons
   }
 }
 
-/// Second derivatives of the bounded gap of a point; the foot follows its nearest place on the piece.
+/// Second derivatives of the bounded gap of a point; the foot follows the place on the piece with the least gap.
 Mat<20> AveragedContact::curvature(const Point& point, const Gap& gap, const PressedPoint& pressed,
                                    ConstVectorView x) const {
   const CurvePiece &own = pieces_[point.piece], &foot = pieces_[gap.foot];
   const CurvePiece::Weights slope = foot.slope(gap.t);
-  const Vec<2> tangent = foot.position(slope, x), bend = foot.position(foot.bend(), x);
+  const Vec<2> along = foot.position(slope, x), bend = foot.position(foot.bend(), x);
+  const Vec<2> across = along - gap.normal.dot(along) * gap.normal;
   Vec<20> first = Vec<20>::Zero(), mixed = Vec<20>::Zero();  // of the distance; of t and the positions
   Mat<20> hessian = Mat<20>::Zero();
   for (int k = 0; k < pressed.size; ++k) {
     first.segment<2>(2 * k) = pressed.coefficients[k] * gap.normal;
-    mixed.segment<2>(2 * k) = -pressed.coefficients[k] * tangent;
+    mixed.segment<2>(2 * k) = -pressed.coefficients[k] * across;
     if (k >= own.size) mixed.segment<2>(2 * k) -= slope[k - own.size] * gap.distance * gap.normal;
     for (int l = 0; l < pressed.size; ++l)
       hessian.block<2, 2>(2 * k, 2 * l).diagonal().setConstant(pressed.coefficients[k] * pressed.coefficients[l]);
   }
   hessian -= first * first.transpose();
-  const double stiffness = tangent.squaredNorm() - gap.distance * gap.normal.dot(bend);
+  const double stiffness =
+      across.squaredNorm() - gap.distance * (gap.normal.dot(bend) + 2 * depths_along(foot, *retraction_)[2]);
   if (gap.t > 0 && gap.t < 1 && stiffness > 0) hessian -= mixed * mixed.transpose() / stiffness;
   return gap.first / gap.distance * hessian + gap.second * first * first.transpose();
 }
