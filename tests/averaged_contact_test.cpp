@@ -24,11 +24,14 @@ struct Lines {
   std::vector<Vec<2>> rest;
   std::vector<std::array<int, 2>> edges;
   std::vector<char> is_corner;
+  std::vector<Vec<2>> outward;
 
-  void add(const std::vector<Vec<2>>& points, bool is_closed) {
+  /// `inside`: a point of the body, or far away on its side.
+  void add(const std::vector<Vec<2>>& points, bool is_closed, const Vec<2>& inside, double sign = 1) {
     const int first = static_cast<int>(rest.size()), count = static_cast<int>(points.size());
     for (int i = 0; i < count; ++i) {
       rest.push_back(points[i]);
+      outward.emplace_back(sign * (points[i] - inside));
       is_corner.push_back(!is_closed && (i == 0 || i + 1 == count));
       if (i + 1 < count || is_closed) edges.push_back({first + i, first + (i + 1) % count});
     }
@@ -42,7 +45,8 @@ struct Lines {
     retraction.width.assign(rest.size(), width);
     retraction.is_corner = is_corner;
     retraction.rest = rest;
-    retraction.stiffness = 3;
+    retraction.outward = outward;
+    retraction.stiffness.assign(rest.size(), 3);
     result.retraction = std::make_shared<Retraction>(retraction);
     return result;
   }
@@ -67,10 +71,10 @@ std::vector<Vec<2>> line(double from, double to, double y, int count) {
   return points;
 }
 
-Lines disc_on_line() {
+Lines disc_on_line(double height = 1.02) {
   Lines lines;
-  lines.add(circle({0.1, 1.02}, 1, 16), true);
-  lines.add(line(-1.5, 1.5, 0, 12), false);
+  lines.add(circle({0.1, height}, 1, 16), true, {0.1, height});
+  lines.add(line(-1.5, 1.5, 0, 12), false, {0, -10});
   return lines;
 }
 
@@ -87,6 +91,21 @@ TEST(AveragedContact, HasTheDerivativesOfItsEnergy) {
       expect_derivatives(contact, x, 1e-7, 2e-5);
       expect_psd(contact, x);
     }
+  }
+}
+
+/// Splines may cross a little where polygons do not: distances are negative there, and contact still pushes apart.
+TEST(AveragedContact, PushesApartWhereCurvesCross) {
+  for (const double height : {0.997, 0.99, 0.98}) {
+    const Lines lines = disc_on_line(height);
+    const CollisionSurface surface = lines.surface(0.02, 0.2, 0.3);
+    const AveragedContact contact(surface, 1);
+    const VectorX x = lines.positions();
+    expect_derivatives(contact, x, 1e-7, 2e-5);
+    const VectorX gradient = gradient_of(contact, x);
+    double upward = 0;
+    for (Eigen::Index i = 0; i < 16; ++i) upward -= gradient[2 * i + 1];
+    EXPECT_GT(upward, 0);
   }
 }
 
@@ -126,8 +145,8 @@ TEST(AveragedContact, OfARingInABoreDoesNotDependOnItsTurn) {
     for (int step = 0; step < 10; ++step) {
       Lines lines;
       const double depth = 0.02, overlap = is_averaged ? 0.01 : 0.02;
-      lines.add(circle({0, 0}, 1 - depth + overlap, 24, 0.026 * step), true);
-      lines.add(circle({0, 0}, 1 + depth, 24), true);
+      lines.add(circle({0, 0}, 1 - depth + overlap, 24, 0.026 * step), true, {0, 0});
+      lines.add(circle({0, 0}, 1 + depth, 24), true, {0, 0}, -1);
       const CollisionSurface surface = lines.surface(depth, 2 * depth);
       const ContactOptions options{.enabled = true, .dhat = 0.03, .convergent = true};
       Workspace workspace;

@@ -97,7 +97,8 @@ std::multimap<TermKind, double> summed_terms(const TrialScene& scene) {
                                                                  .width = std::vector<double>(n, 0),
                                                                  .is_corner = std::vector<char>(n, 1),
                                                                  .rest = cells.rest,
-                                                                 .stiffness = 1});
+                                                                 .outward = cells.rest,
+                                                                 .stiffness = std::vector<double>(n, 1)});
   }
   const VectorX x = with_obstacles(scene.fields.x, obstacles.x);
   const VectorX predictor = with_obstacles(scene.fields.predictor, obstacles.x);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <set>
 #include <span>
@@ -16,9 +15,10 @@
 #include <vector>
 
 #include "core/connected_parts.hpp"
+#include "energy/contact/averaged_contact.hpp"
 #include "energy/contact/retraction.hpp"
-#include "energy/rigid_body.hpp"
 #include "mesh/cell_of_facet.hpp"
+#include "simulation/contact_surface.hpp"
 #include "simulation/step_terms.hpp"
 #include "simulation/unsupported.hpp"
 
@@ -27,7 +27,7 @@ namespace itr {
 namespace {
 
 constexpr double kSmooth = 35 * std::numbers::pi / 180;  ///< largest turn of a smooth surface at a vertex
-constexpr double kDepthBySag = 3;
+constexpr double kDepthBySag = 3, kLeastDepthBySag = 1.5;
 constexpr double kMostOfCell = 0.125;  ///< of the way through a cell
 constexpr double kStiffnessByModulus = 10;
 
@@ -74,71 +74,65 @@ class LargestByPart {
   int part_ = kNone;
 };
 
-/// The polylines of the bodies' boundary and of the obstacles, by vertex: those of the mesh come first.
+/// By vertex, the connected part of the bodies.
+template <int Dim>
+std::vector<int> connected_bodies(const Mesh<Dim>& mesh) {
+  std::vector<std::array<int, Dim + 1>> cells;
+  for (const CellId c : mesh.live_cells()) cells.push_back(mesh.cell(c));
+  return connected_parts<Dim + 1>(mesh.num_vertices(), std::span<const std::array<int, Dim + 1>>(cells));
+}
+
+/// The polylines of the bodies' boundary, by vertex of the mesh. A part is a connected part of the bodies.
 class Polylines {
  public:
-  explicit Polylines(const Setup<2>& setup) : mesh_(setup.mesh), rest_(setup.mesh.rest()) {
-    const int vertices = mesh_.num_vertices();
-    rest_.insert(rest_.end(), setup.obstacles.rest.begin(), setup.obstacles.rest.end());
-    corners_.resize(rest_.size());
-    std::vector<double> lengths(rest_.size(), 0);
-    const auto add = [&](int a, int b, const Vec<2>& outward) {
-      const double length = (rest_[a] - rest_[b]).norm();
+  explicit Polylines(const Mesh<2>& mesh) : mesh_(mesh), corners_(mesh.num_vertices()) {
+    std::vector<double> lengths(corners_.size(), 0);
+    for (const FacetId f : mesh.live_facets()) {
+      const auto& [a, b] = mesh.facet(f);
+      const Vec<2> outward = outward_of(f);
+      const double length = (mesh.rest(a) - mesh.rest(b)).norm();
       corners_[a].add(b, outward, length);
       corners_[b].add(a, outward, length);
       lengths[a] += length;
       lengths[b] += length;
-      edges_.push_back({a, b});
-    };
-    for (FacetId f = 0; f < mesh_.facet_slots(); ++f) {
-      const auto [a, b] = mesh_.facet(f);
-      add(a, b, outward_of(f));
-    }
-    num_facets_ = edges_.size();
-    for (const auto& [a, b] : setup.obstacles.edges) {
-      const Vec<2> along = (setup.obstacles.rest[b] - setup.obstacles.rest[a]).normalized();
-      add(vertices + a, vertices + b, {along[1], -along[0]});
+      facets_.push_back({a, b});
     }
     for (std::size_t v = 0; v < corners_.size(); ++v) corners_[v].finish(lengths[v]);
-    part_ = connected_parts<2>(rest_.size(), std::span<const std::array<int, 2>>(edges_));
-    curvature_ = largest_by_part([&](int v) { return corners_[v].curvature; });
+    part_ = connected_bodies(mesh);
+    for (std::size_t v = 0; v < corners_.size(); ++v) curvature_.include(part_[v], corners_[v].curvature);
   }
 
-  double largest_of_others(int v, const LargestByPart& by_part) const { return by_part.of_others(part_[v]); }
-  /// The largest value f(v) >= 0 of each part's vertices.
-  template <typename F>
-  LargestByPart largest_by_part(const F& f) const {
-    LargestByPart largest;
-    for (std::size_t v = 0; v < part_.size(); ++v) largest.include(part_[v], f(static_cast<int>(v)));
-    return largest;
-  }
-  /// How far the edges at v may be from the smooth surfaces that they and others stand for [m].
-  double sag(int v) const {
-    const Corner& corner = corners_[v];
-    if (corner.neighbour[0] == kNone) return 0;
-    double curvature = std::max(corner.curvature, is_of_body(v) ? largest_of_others(v, curvature_) : 0);
-    for (const int u : corner.neighbour)
-      if (u != kNone) curvature = std::max(curvature, corners_[u].curvature);
-    return std::min(curvature * corner.longest, kSmooth) * corner.longest / 8;
-  }
-  bool is_of_body(int v) const { return v < mesh_.num_vertices(); }
+  /// How far the edges at v may be from the smooth surfaces that they and others stand for [m]. Surfaces that bend by more
+  /// over one of these edges touch less than an edge: they do not count.
+  double sag(int v) const { return sag(v, curvature_.of_others(part_[v])); }
+  /// The part of it that is by the curvature at v itself [m].
+  double own_sag(int v) const { return sag(v, 0); }
   const std::vector<Corner>& corners() const { return corners_; }
-  const std::vector<Vec<2>>& rest() const { return rest_; }
-  /// The boundary facets, and not the obstacles' edges.
-  std::span<const std::array<int, 2>> facets() const { return std::span(edges_).first(num_facets_); }
+  const std::vector<std::array<int, 2>>& facets() const { return facets_; }
+  bool is_on(int v) const { return corners_[v].neighbour[0] != kNone; }
 
  private:
+  double sag(int v, double curvature_of_others) const {
+    const Corner& corner = corners_[v];
+    double curvature = 0;
+    const auto include = [&](double other) {
+      if (other * corner.longest < kSmooth) curvature = std::max(curvature, other);
+    };
+    include(corner.curvature);
+    include(curvature_of_others);
+    for (const int u : corner.neighbour)
+      if (u != kNone) include(corners_[u].curvature);
+    return curvature * corner.longest * corner.longest / 8;
+  }
   Vec<2> outward_of(FacetId f) const {
-    const auto [a, b] = mesh_.facet(f);
-    const Vec<2> along = (rest_[b] - rest_[a]).normalized(), normal(along[1], -along[0]);
-    return normal.dot(mesh_.barycenter(cell_of_facet(mesh_, f)) - rest_[a]) < 0 ? normal : Vec<2>(-normal);
+    const auto& [a, b] = mesh_.facet(f);
+    const Vec<2> along = (mesh_.rest(b) - mesh_.rest(a)).normalized(), normal(along[1], -along[0]);
+    return normal.dot(mesh_.barycenter(cell_of_facet(mesh_, f)) - mesh_.rest(a)) < 0 ? normal : Vec<2>(-normal);
   }
 
   const Mesh<2>& mesh_;
-  std::vector<Vec<2>> rest_;
   std::vector<Corner> corners_;
-  std::vector<std::array<int, 2>> edges_;
-  std::size_t num_facets_ = 0;
+  std::vector<std::array<int, 2>> facets_;
   std::vector<int> part_;
   LargestByPart curvature_;
 };
@@ -180,25 +174,18 @@ Behind find_behind(const Mesh<2>& mesh, int v, const Corner& corner, double dept
   return behind;  // as where cells of several bodies meet
 }
 
-double least_modulus(const Setup<2>& setup) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& [body, material] : setup.materials)
-    if (!rigid_body_of(material)) least = std::min(least, material.youngs_modulus);
-  return least;
-}
-
 /// The proxy and its retraction; its vertices are those of the boundary, in their order.
-void add_proxy(Setup<2>& setup, const Polylines& lines, const std::vector<double>& sag) {
+CollisionProxy<2> retracted(const Setup<2>& setup, const Polylines& lines, const std::vector<double>& sag) {
   const Mesh<2>& mesh = setup.mesh;
-  const int vertices = mesh.num_vertices();
-  std::vector<int> own(vertices, kNone);
+  std::vector<int> own(mesh.num_vertices(), kNone);
   CollisionProxy<2> proxy;
   Retraction retraction;
   std::vector<Eigen::Triplet<double>> entries;
-  for (int v = 0; v < vertices; ++v) {
-    if (lines.corners()[v].neighbour[0] == kNone) continue;
+  for (int v = 0; v < mesh.num_vertices(); ++v) {
+    if (!lines.is_on(v)) continue;
+    const Corner& corner = lines.corners()[v];
     own[v] = static_cast<int>(proxy.rest.size());
-    const Behind behind = find_behind(mesh, v, lines.corners()[v], kDepthBySag * sag[v]);
+    const Behind behind = find_behind(mesh, v, corner, kDepthBySag * sag[v]);
     Vec<2> at = Vec<2>::Zero();
     for (int k = 0; k < 3; ++k) {
       if (behind.weights[k] == 0) continue;
@@ -207,51 +194,57 @@ void add_proxy(Setup<2>& setup, const Polylines& lines, const std::vector<double
     }
     proxy.rest.push_back(at);
     retraction.depth.push_back(behind.depth);
-    retraction.is_corner.push_back(!lines.corners()[v].is_smooth);
+    retraction.is_corner.push_back(!corner.is_smooth);
+    retraction.outward.push_back(corner.normal[0] + corner.normal[1]);
+    const int body = mesh.body(mesh.cells_of(v).front());
+    retraction.stiffness.push_back(kStiffnessByModulus * setup.materials.at(body).youngs_modulus);
   }
-  const int size = static_cast<int>(proxy.rest.size());
+  const double deepest = *std::max_element(retraction.depth.begin(), retraction.depth.end());
+  for (const double depth : retraction.depth) retraction.width.push_back(depth > 0 ? depth + deepest : 0);
   retraction.rest = proxy.rest;
   for (const auto& [a, b] : lines.facets()) proxy.edges.push_back({own[a], own[b]});
-  proxy.weights.resize(size, vertices);
+  proxy.weights.resize(std::ssize(proxy.rest), mesh.num_vertices());
   proxy.weights.setFromTriplets(entries.begin(), entries.end());
-  for (std::size_t o = 0; o < setup.obstacles.rest.size(); ++o) {
-    retraction.depth.push_back(0);
-    retraction.is_corner.push_back(!lines.corners()[vertices + o].is_smooth);
-    retraction.rest.push_back(setup.obstacles.rest[o]);
-  }
-  retraction.width.assign(retraction.depth.size(), 0);
-  const LargestByPart deepest =
-      lines.largest_by_part([&](int v) { return v < vertices && own[v] != kNone ? retraction.depth[own[v]] : 0.0; });
-  for (int v = 0; v < vertices; ++v)
-    if (own[v] != kNone && retraction.depth[own[v]] > 0)
-      retraction.width[own[v]] = retraction.depth[own[v]] + lines.largest_of_others(v, deepest);
-  retraction.stiffness = kStiffnessByModulus * least_modulus(setup);
   proxy.retraction = std::make_shared<const Retraction>(std::move(retraction));
-  setup.proxy = std::move(proxy);
+  return proxy;
 }
 
+/// Whether two vertices of the boundary are in one place at rest.
+bool has_coincident_vertices(const Mesh<2>& mesh, const Polylines& lines) {
+  std::set<std::pair<double, double>> places;
+  for (int v = 0; v < mesh.num_vertices(); ++v)
+    if (lines.is_on(v) && !places.emplace(mesh.rest(v)[0], mesh.rest(v)[1]).second) return true;
+  return false;
+}
+
+/// Whether averaged gaps of bodies at rest push.
+bool overlaps_at_rest(const Setup<2>& setup) {
+  const CollisionSurface surface = contact_surface(setup, setup.mesh).surface;
+  VectorX x(2 * std::ssize(setup.proxy->rest));
+  for (int v = 0; v < std::ssize(setup.proxy->rest); ++v) vertex_of<2>(x, v) = setup.proxy->rest[v];
+  Workspace workspace;
+  return AveragedContact(surface, 1).value(x, workspace) > 0;
+}
+
+/// Why gaps cannot be averaged, or nothing.
 std::string retract(Setup<2>& setup) {
-  if (setup.proxy) return {};
-  const Polylines lines(setup);
-  std::vector<double> sag(lines.rest().size());
-  double largest = 0, of_others = 0;  // of two parts
-  for (int v = 0; v < static_cast<int>(sag.size()); ++v) {
-    sag[v] = lines.sag(v);
-    largest = std::max(largest, sag[v]);
-  }
-  const LargestByPart by_part = lines.largest_by_part([&](int v) { return sag[v]; });
-  for (int v = 0; v < static_cast<int>(sag.size()); ++v)
-    of_others = std::max(of_others, sag[v] + lines.largest_of_others(v, by_part));
+  const Polylines lines(setup.mesh);
+  if (has_coincident_vertices(setup.mesh, lines)) return "faces coincide at rest";
+  std::vector<double> sag;
+  for (int v = 0; v < setup.mesh.num_vertices(); ++v) sag.push_back(lines.is_on(v) ? lines.sag(v) : 0);
+  const double largest = *std::max_element(sag.begin(), sag.end());
   const Units& units = setup.units;
-  if (!(of_others > setup.contact.dhat))
-    return fmt::format("gaps are not averaged: edges are nearer to smooth surfaces, by {}, than d-hat",
-                       units.text(of_others, "m", 3));
-  add_proxy(setup, lines, sag);
+  if (!(2 * largest > setup.contact.dhat))
+    return fmt::format("edges are nearer to smooth surfaces, by {}, than d-hat", units.text(largest, "m", 3));
+  setup.proxy = retracted(setup, lines, sag);
   const auto& depth = setup.proxy->retraction->depth;
-  const double deepest = depth.empty() ? 0 : *std::max_element(depth.begin(), depth.end());
-  return fmt::format(
-      "gaps are averaged where edges are up to {} from smooth surfaces: what is certified lies up to {} behind the boundary",
-      units.text(largest, "m", 3), units.text(deepest, "m", 3));
+  bool is_cut = false;
+  for (int v = 0, own = 0; v < setup.mesh.num_vertices(); ++v)
+    if (lines.is_on(v) && depth[own++] < kLeastDepthBySag * lines.own_sag(v))
+      is_cut = is_cut || lines.corners()[v].is_smooth;
+  if (!is_cut && !overlaps_at_rest(setup)) return {};
+  setup.proxy.reset();
+  return is_cut ? "cells at the surface are too flat for edges that stand for so much curvature" : "bodies overlap at rest";
 }
 
 }  // namespace
@@ -261,23 +254,25 @@ bool averaging_helps(const Setup<Dim>& setup) {
   if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia() || setup.fields.error_bars)
     return false;
   const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
-  std::vector<std::array<int, Dim + 1>> cells;
-  for (const CellId c : setup.mesh.live_cells()) cells.push_back(setup.mesh.cell(c));
-  const std::vector<int> part =
-      connected_parts<Dim + 1>(setup.mesh.node_slots(), std::span<const std::array<int, Dim + 1>>(cells));
+  const std::vector<int> part = connected_bodies(setup.mesh);
   std::set<int> parts, held_parts;
-  for (const auto& cell : cells)
-    for (const VertexId v : cell) {
-      parts.insert(part[v]);
-      if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
-        held_parts.insert(part[v]);
-    }
+  for (const VertexId v : setup.mesh.live_vertices()) {
+    parts.insert(part[v]);
+    if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
+      held_parts.insert(part[v]);
+  }
   return parts == held_parts;
 }
 
 template <int Dim>
 std::string retract_surfaces(Setup<Dim>& setup) {
-  if constexpr (Dim == 2) return retract(setup);
+  if (setup.proxy) return {};
+  if constexpr (Dim == 2) {
+    if (const std::string reason = retract(setup); !reason.empty()) return "gaps are not averaged: " + reason;
+    const auto& depth = setup.proxy->retraction->depth;
+    return fmt::format("gaps are averaged: what is certified lies up to {} behind the boundary",
+                       setup.units.text(*std::max_element(depth.begin(), depth.end()), "m", 3));
+  }
   return {};
 }
 

@@ -49,7 +49,8 @@ constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
     {{"/contact/average_gaps",
-      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with a collision mesh, "
+      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with obstacles, a collision "
+      "mesh, "
       "friction by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies, fluids that penetrate or "
       "the "
       "plain form of contact"},
@@ -180,7 +181,7 @@ bool can_average_gaps(const Setup<Dim>& setup) {
   const bool has_other_surface = (setup.proxy && !setup.proxy->retraction) || contact.resolve_overlap || !setup.ties.empty();
   return Dim == 2 && contact.convergent && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup) &&
          !has_other_surface && contact.friction_pairs.empty() && !contact.has_adhesion() && !damps &&
-         !has_rigid_bodies(setup.materials) && setup.fluids.empty();
+         !has_rigid_bodies(setup.materials) && setup.fluids.empty() && setup.obstacles.rest.empty();
 }
 
 template <int Dim>

@@ -159,19 +159,27 @@ class AveragedContact::GapFinder {
     double least = std::numeric_limits<double>::infinity();
     for (const int i : near) {
       if (!sees(own, contact_.pieces_[i])) continue;
-      const double t = nearest_less_depth(placed_[i], depths_[i], q);
-      const Vec<2> separation = q - placed_[i].at(t);
-      const double distance = separation.norm();
-      if (const double left = distance - depths_[i].dot(CurvePiece::powers(t)); left < least) {
-        least = left;
-        gap.distance = distance;
+      const PlacedPiece& piece = placed_[i];
+      const double nearest = piece.nearest(q);
+      const Vec<2> tangent = piece.c[1] + 2 * nearest * piece.c[2];
+      const Vec<2> outward = contact_.pieces_[i].side * Vec<2>(tangent[1], -tangent[0]);
+      // Behind the other curve distances are negative, so that contact never holds an overlap.
+      const double sign = outward.dot(q - piece.at(nearest)) < 0 ? -1 : 1;
+      if (sign < 0 && (q - piece.at(nearest)).norm() > point.width) continue;  // the far side of a thin body
+      const double t = nearest_less_depth(piece, sign * depths_[i], q);
+      const Vec<2> separation = q - piece.at(t);
+      const double distance = separation.norm(), depth = depths_[i].dot(CurvePiece::powers(t));
+      if (distance - depth < least) {
+        least = distance - depth;
+        gap.distance = sign * distance;
         gap.foot = i;
         gap.t = t;
-        gap.normal = separation / distance;
+        gap.normal = sign * separation / distance;
       }
     }
     double value = most;
-    if (gap.foot != kNone) value = least - contact_.depth(own, point.t);
+    if (gap.foot != kNone)
+      value = gap.distance - contact_.depth(own, point.t) - contact_.depth(contact_.pieces_[gap.foot], gap.t);
     const BoundedGap bounded(value, most);
     gap.value = bounded.value;
     gap.first = bounded.first;
@@ -220,7 +228,7 @@ auto AveragedContact::averages(const std::vector<Gap>& gaps) const -> Averages {
     const double width = retraction_->width[v];
     if (!(measure_[v] > 0) || width == 0 || sum[v] >= 0) continue;
     const Barrier barrier(1 + sum[v] / measure_[v] / width);
-    const double half = retraction_->stiffness / 2;
+    const double half = retraction_->stiffness[v] / 2;
     result.value[v] = half * width * barrier.value;
     result.first[v] = half * barrier.first;
     result.second[v] = half / width * barrier.second;

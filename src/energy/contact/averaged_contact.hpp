@@ -45,10 +45,10 @@ class AveragedContact final : public Energy {
   /// Distance of a point to other curves, as it enters the averages.
   struct Gap {
     double value = 0, first = 0, second = 0;  ///< bounded from above, and its derivatives by the distance
-    double distance = 0;
-    int foot = kNone;  ///< the nearest piece; kNone: none is near
-    double t = 0;      ///< and where on it
-    Vec<2> normal = Vec<2>::Zero();
+    double distance = 0;                      ///< negative behind the other curve [m]
+    int foot = kNone;                         ///< the nearest piece; kNone: none is near
+    double t = 0;                             ///< and where on it
+    Vec<2> normal = Vec<2>::Zero();           ///< away from the other body
     bool acts() const { return first != 0; }
   };
   struct Cache;

@@ -67,7 +67,14 @@ class PieceBuilder {
       add(owners[k], 1.25 * hat);  // the control point that makes the curve pass near the vertex
       for (const int neighbour : neighbours_[owners[k]]) add(neighbour, -0.125 * hat);
     }
+    const Vec<2> tangent = rest_position(piece, piece.slope(0.5));
+    piece.side = Vec<2>(tangent[1], -tangent[0]).dot(retraction_.outward[v]) < 0 ? -1 : 1;
     return piece;
+  }
+  Vec<2> rest_position(const CurvePiece& piece, const CurvePiece::Weights& weights) const {
+    Vec<2> p = Vec<2>::Zero();
+    for (int i = 0; i < piece.size; ++i) p += weights[i] * retraction_.rest[piece.vertices[i]];
+    return p;
   }
 
   const Retraction& retraction_;

@@ -24,6 +24,7 @@ struct CurvePiece {
   Eigen::Matrix<double, kMost, 3> coefficients = Eigen::Matrix<double, kMost, 3>::Zero();  ///< of 1, t, t^2
   std::array<int, 3> owners{};   ///< vertices whose hats are not 0 here
   Mat<3> hats = Mat<3>::Zero();  ///< coefficients of these hats, which sum to 1
+  double side = 1;               ///< 1 where (t_y, -t_x) of a tangent t is outward, else -1
   double length = 0;             ///< at rest [m]
 
   static Vec<3> powers(double t) { return {1, t, t * t}; }
