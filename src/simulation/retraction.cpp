@@ -238,10 +238,11 @@ std::string retract(Setup<2>& setup) {
     return fmt::format("edges are nearer to smooth surfaces, by {}, than d-hat", units.text(largest, "m", 3));
   setup.proxy = retracted(setup, lines, sag);
   const auto& depth = setup.proxy->retraction->depth;
-  bool is_cut = false;
+  const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
+  bool is_cut = false;  // where surfaces slide
   for (int v = 0, own = 0; v < setup.mesh.num_vertices(); ++v)
     if (lines.is_on(v) && depth[own++] < kLeastDepthBySag * lines.own_sag(v))
-      is_cut = is_cut || lines.corners()[v].is_smooth;
+      is_cut = is_cut || (lines.corners()[v].is_smooth && !(held[2 * v] && held[2 * v + 1]));
   if (!is_cut && !overlaps_at_rest(setup)) return {};
   setup.proxy.reset();
   return is_cut ? "cells at the surface are too flat for edges that stand for so much curvature" : "bodies overlap at rest";
