@@ -353,7 +353,6 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (contact.may_average_gaps) contact.average_gaps = averaging_helps(*this);
   if (contact.enabled && contact.average_gaps)
     if (std::string chosen = retract_surfaces(*this); !chosen.empty()) words.push_back(std::move(chosen));
-  if (contact.may_average_gaps) contact.average_gaps = contact.average_gaps && this->proxy;
   if (contact.enabled && contact.barrier_stiffness == 0)
     if (std::string chosen = choose_stiffness(*this, contact); !chosen.empty()) words.push_back(std::move(chosen));
   if (contact.enabled && contact.friction_velocity == 0 && this->time.has_inertia()) {

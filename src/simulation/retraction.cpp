@@ -9,15 +9,14 @@
 #include <cmath>
 #include <numbers>
 #include <set>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "core/connected_parts.hpp"
 #include "energy/contact/averaged_contact.hpp"
 #include "energy/contact/retraction.hpp"
 #include "mesh/cell_of_facet.hpp"
+#include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/step_terms.hpp"
 #include "simulation/unsupported.hpp"
@@ -34,7 +33,7 @@ constexpr double kStiffnessByModulus = 10;
 /// A vertex of a polyline with its two edges: at rest.
 struct Corner {
   std::array<int, 2> neighbour{kNone, kNone};
-  std::array<Vec<2>, 2> normal{Vec<2>::Zero(), Vec<2>::Zero()};  ///< outward, of the edges; of obstacles either side
+  std::array<Vec<2>, 2> normal{Vec<2>::Zero(), Vec<2>::Zero()};  ///< outward, of the edges
   double longest = 0;                                            ///< edge [m]
   double curvature = 0;                                          ///< where it is smooth [1/m]
   bool is_smooth = false;
@@ -74,15 +73,7 @@ class LargestByPart {
   int part_ = kNone;
 };
 
-/// By vertex, the connected part of the bodies.
-template <int Dim>
-std::vector<int> connected_bodies(const Mesh<Dim>& mesh) {
-  std::vector<std::array<int, Dim + 1>> cells;
-  for (const CellId c : mesh.live_cells()) cells.push_back(mesh.cell(c));
-  return connected_parts<Dim + 1>(mesh.num_vertices(), std::span<const std::array<int, Dim + 1>>(cells));
-}
-
-/// The polylines of the bodies' boundary, by vertex of the mesh. A part is a connected part of the bodies.
+/// The polylines of the bodies' boundary, by vertex of the mesh. Parts are those of the mesh.
 class Polylines {
  public:
   explicit Polylines(const Mesh<2>& mesh) : mesh_(mesh), corners_(mesh.num_vertices()) {
@@ -98,13 +89,12 @@ class Polylines {
       facets_.push_back({a, b});
     }
     for (std::size_t v = 0; v < corners_.size(); ++v) corners_[v].finish(lengths[v]);
-    part_ = connected_bodies(mesh);
-    for (std::size_t v = 0; v < corners_.size(); ++v) curvature_.include(part_[v], corners_[v].curvature);
+    for (int v = 0; v < mesh.num_vertices(); ++v) curvature_.include(mesh.part_of_vertex(v), corners_[v].curvature);
   }
 
   /// How far the edges at v may be from the smooth surfaces that they and others stand for [m]. Surfaces that bend by more
   /// over one of these edges touch less than an edge: they do not count.
-  double sag(int v) const { return sag(v, curvature_.of_others(part_[v])); }
+  double sag(int v) const { return sag(v, curvature_.of_others(mesh_.part_of_vertex(v))); }
   /// The part of it that is by the curvature at v itself [m].
   double own_sag(int v) const { return sag(v, 0); }
   const std::vector<Corner>& corners() const { return corners_; }
@@ -133,7 +123,6 @@ class Polylines {
   const Mesh<2>& mesh_;
   std::vector<Corner> corners_;
   std::vector<std::array<int, 2>> facets_;
-  std::vector<int> part_;
   LargestByPart curvature_;
 };
 
@@ -209,12 +198,10 @@ CollisionProxy<2> retracted(const Setup<2>& setup, const Polylines& lines, const
   return proxy;
 }
 
-/// Whether two vertices of the boundary are in one place at rest.
-bool has_coincident_vertices(const Mesh<2>& mesh, const Polylines& lines) {
-  std::set<std::pair<double, double>> places;
-  for (int v = 0; v < mesh.num_vertices(); ++v)
-    if (lines.is_on(v) && !places.emplace(mesh.rest(v)[0], mesh.rest(v)[1]).second) return true;
-  return false;
+bool has_faces_that_coincide(const Setup<2>& setup) {
+  Mesh<2> mesh = setup.mesh;
+  close_coincident_faces(setup, mesh);
+  return has_closed_faces(mesh);
 }
 
 /// Whether averaged gaps of bodies at rest push.
@@ -228,8 +215,8 @@ bool overlaps_at_rest(const Setup<2>& setup) {
 
 /// Why gaps cannot be averaged, or nothing.
 std::string retract(Setup<2>& setup) {
+  if (has_faces_that_coincide(setup)) return "faces coincide at rest";
   const Polylines lines(setup.mesh);
-  if (has_coincident_vertices(setup.mesh, lines)) return "faces coincide at rest";
   std::vector<double> sag;
   for (int v = 0; v < setup.mesh.num_vertices(); ++v) sag.push_back(lines.is_on(v) ? lines.sag(v) : 0);
   const double largest = *std::max_element(sag.begin(), sag.end());
@@ -255,12 +242,12 @@ bool averaging_helps(const Setup<Dim>& setup) {
   if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia() || setup.fields.error_bars)
     return false;
   const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
-  const std::vector<int> part = connected_bodies(setup.mesh);
   std::set<int> parts, held_parts;
   for (const VertexId v : setup.mesh.live_vertices()) {
-    parts.insert(part[v]);
+    const int part = setup.mesh.part_of_vertex(v);
+    parts.insert(part);
     if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
-      held_parts.insert(part[v]);
+      held_parts.insert(part);
   }
   return parts == held_parts;
 }
@@ -269,7 +256,10 @@ template <int Dim>
 std::string retract_surfaces(Setup<Dim>& setup) {
   if (setup.proxy) return {};
   if constexpr (Dim == 2) {
-    if (const std::string reason = retract(setup); !reason.empty()) return "gaps are not averaged: " + reason;
+    if (const std::string reason = retract(setup); !reason.empty()) {
+      setup.contact.average_gaps = false;
+      return "gaps are not averaged: " + reason;
+    }
     const auto& depth = setup.proxy->retraction->depth;
     return fmt::format("gaps are averaged: what is certified lies up to {} behind the boundary",
                        setup.units.text(*std::max_element(depth.begin(), depth.end()), "m", 3));

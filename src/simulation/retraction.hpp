@@ -13,7 +13,8 @@ template <int Dim>
 bool averaging_helps(const Setup<Dim>& setup);
 
 /// Gives a setup in 2D that asks for averaged gaps a proxy behind the boundary of its bodies, of which they act
-/// (docs/theory.md, "Averaged gaps"); none where no surface is coarse. Returns what it chose, in words.
+/// (docs/theory.md, "Averaged gaps"); where its mesh does not suit them, it asks for them no longer. Returns the choice in
+/// words.
 template <int Dim>
 std::string retract_surfaces(Setup<Dim>& setup);
 

@@ -49,11 +49,9 @@ constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
     {{"/contact/average_gaps",
-      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with obstacles, a collision "
-      "mesh, "
-      "friction by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies, fluids that penetrate or "
-      "the "
-      "plain form of contact"},
+      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with obstacles, a "
+      "collision mesh, friction by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies, fluids that "
+      "penetrate or the plain form of contact"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !can_average_gaps(setup); }},
     {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},

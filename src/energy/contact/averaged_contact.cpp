@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 #include "core/parallel.hpp"
 #include "core/scratch_vector.hpp"
@@ -62,46 +63,34 @@ Vec<3> depths_along(const CurvePiece& piece, const Retraction& retraction) {
   return depths;
 }
 
-/// The t in [0, 1] with the least distance from q less depth: there the gap has the derivatives of a fixed t.
-double nearest_less_depth(const PlacedPiece& piece, const Vec<3>& depths, const Vec<2>& q) {
-  constexpr int kMostIterations = 60;
-  double t = piece.nearest(q);
-  if (depths[1] == 0 && depths[2] == 0) return t;
+/// The t in [0, 1] with the least distance from q less depth, from the nearest one on: there the gap has the derivatives of
+/// a fixed t.
+double least_less_depth(const PlacedPiece& piece, const Vec<3>& depths, const Vec<2>& q, double nearest) {
+  if (depths[1] == 0 && depths[2] == 0) return nearest;
   const auto slope = [&](double s) {
-    return (piece.at(s) - q).normalized().dot(piece.c[1] + 2 * s * piece.c[2]) - depths[1] - 2 * s * depths[2];
+    return (piece.at(s) - q).normalized().dot(piece.tangent(s)) - depths[1] - 2 * s * depths[2];
   };
-  double low = 0, high = 1;
-  if (slope(t) > 0) {
-    high = t;
-    if (slope(low) >= 0) return low;
-  } else {
-    low = t;
-    if (slope(high) <= 0) return high;
-  }
-  for (int k = 0; k < kMostIterations; ++k) {
-    const double value = slope(t);
-    if (value == 0) break;
-    (value > 0 ? high : low) = t;
-    const Vec<2> away = piece.at(t) - q, tangent = piece.c[1] + 2 * t * piece.c[2];
+  const bool is_before = slope(nearest) > 0;
+  const double low = is_before ? 0 : nearest, high = is_before ? nearest : 1;
+  if (is_before && slope(low) >= 0) return low;
+  if (!is_before && slope(high) <= 0) return high;
+  return bracketed_root(low, high, nearest, [&](double s) {
+    const Vec<2> away = piece.at(s) - q, tangent = piece.tangent(s);
     const double distance = away.norm(), along = away.dot(tangent) / distance;
-    const double bend = (tangent.squaredNorm() - along * along + 2 * away.dot(piece.c[2])) / distance - 2 * depths[2];
-    double next = t - value / bend;
-    if (!(next > low && next < high)) next = (low + high) / 2;
-    const bool is_same = std::abs(next - t) <= 1e-15;
-    t = next;
-    if (is_same) break;
-  }
-  return t;
+    return std::pair(slope(s),
+                     (tangent.squaredNorm() - along * along + 2 * away.dot(piece.c[2])) / distance - 2 * depths[2]);
+  });
 }
 
 }  // namespace
 
-/// The gaps at the positions that were asked for last.
+/// Gaps and averages at the positions that were asked for last.
 struct AveragedContact::Cache {
   const CollisionSurface* surface = nullptr;
   int revision = 0;
   ScratchVector x;
   std::vector<Gap> gaps;
+  Averages averages;
 };
 
 AveragedContact::AveragedContact(const CollisionSurface& surface, double scale)
@@ -125,10 +114,6 @@ AveragedContact::AveragedContact(const CollisionSurface& surface, double scale)
   }
 }
 
-double AveragedContact::depth(const CurvePiece& piece, double t) const {
-  return depths_along(piece, *retraction_).dot(CurvePiece::powers(t));
-}
-
 /// All pieces at some positions, in a tree.
 class AveragedContact::GapFinder {
  public:
@@ -148,11 +133,12 @@ class AveragedContact::GapFinder {
     for (const double depth : contact.retraction_->depth) deepest_ = std::max(deepest_, depth);
   }
 
-  Gap find(const Point& point) const {
+  /// `near` is scratch.
+  Gap find(const Point& point, std::vector<int>& near) const {
     const CurvePiece& own = contact_.pieces_[point.piece];
     const Vec<2> q = placed_[point.piece].at(point.t);
     const double most = kReach * point.width;
-    std::vector<int> near;
+    near.clear();
     tree_.query(Box<2>{q, q}.inflated(most + 2 * deepest_), near);
     std::sort(near.begin(), near.end());
     Gap gap;
@@ -161,16 +147,16 @@ class AveragedContact::GapFinder {
       if (!sees(own, contact_.pieces_[i])) continue;
       const PlacedPiece& piece = placed_[i];
       const double nearest = piece.nearest(q);
-      const Vec<2> tangent = piece.c[1] + 2 * nearest * piece.c[2];
+      const Vec<2> tangent = piece.tangent(nearest);
       const Vec<2> outward = contact_.pieces_[i].side * Vec<2>(tangent[1], -tangent[0]);
       // Behind the other curve distances are negative, so that contact never holds an overlap.
       const double sign = outward.dot(q - piece.at(nearest)) < 0 ? -1 : 1;
       if (sign < 0 && (q - piece.at(nearest)).norm() > point.width) continue;  // the far side of a thin body
-      const double t = nearest_less_depth(piece, sign * depths_[i], q);
+      const double t = least_less_depth(piece, sign * depths_[i], q, nearest);
       const Vec<2> separation = q - piece.at(t);
-      const double distance = separation.norm(), depth = depths_[i].dot(CurvePiece::powers(t));
-      if (distance - depth < least) {
-        least = distance - depth;
+      const double distance = separation.norm();
+      if (const double left = distance - depth_at(i, t); left < least) {
+        least = left;
         gap.distance = sign * distance;
         gap.foot = i;
         gap.t = t;
@@ -178,8 +164,7 @@ class AveragedContact::GapFinder {
       }
     }
     double value = most;
-    if (gap.foot != kNone)
-      value = gap.distance - contact_.depth(own, point.t) - contact_.depth(contact_.pieces_[gap.foot], gap.t);
+    if (gap.foot != kNone) value = gap.distance - depth_at(point.piece, point.t) - depth_at(gap.foot, gap.t);
     const BoundedGap bounded(value, most);
     gap.value = bounded.value;
     gap.first = bounded.first;
@@ -188,6 +173,7 @@ class AveragedContact::GapFinder {
   }
 
  private:
+  double depth_at(int piece, double t) const { return depths_[piece].dot(CurvePiece::powers(t)); }
   bool sees(const CurvePiece& own, const CurvePiece& other) const {
     if (own.part != other.part) return true;
     const auto& rest = contact_.retraction_->rest;
@@ -201,46 +187,54 @@ class AveragedContact::GapFinder {
   double deepest_ = 0;
 };
 
-auto AveragedContact::gaps(ConstVectorView x, Workspace& workspace) const -> const std::vector<Gap>& {
+auto AveragedContact::at(ConstVectorView x, Workspace& workspace) const -> const Cache& {
   auto& cache = workspace.get<Cache>();
   if (cache.surface == surface_ && cache.revision == surface_->revision && cache.x.size() == x.size() &&
       std::memcmp(cache.x.view().data(), x.data(), sizeof(double) * x.size()) == 0)
-    return cache.gaps;
+    return cache;
   const GapFinder finder(*this, x);
   cache.gaps.resize(points_.size());
   parallel_blocks(points_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) cache.gaps[i] = finder.find(points_[i]);
+    std::vector<int> near;
+    for (std::size_t i = begin; i < end; ++i) cache.gaps[i] = finder.find(points_[i], near);
   });
+  average(cache.gaps, cache.averages);
   cache.surface = surface_;
   cache.revision = surface_->revision;
   cache.x = x;
-  return cache.gaps;
+  return cache;
 }
 
-auto AveragedContact::averages(const std::vector<Gap>& gaps) const -> Averages {
+void AveragedContact::average(const std::vector<Gap>& gaps, Averages& averages) const {
   const std::size_t n = measure_.size();
   std::vector<double> sum(n, 0);
   for (std::size_t i = 0; i < points_.size(); ++i)
     for (int k = 0; k < 3; ++k)
       sum[pieces_[points_[i].piece].owners[k]] += points_[i].weight * points_[i].hats[k] * gaps[i].value;
-  Averages result{std::vector<double>(n, 0), std::vector<double>(n, 0), std::vector<double>(n, 0)};
+  for (auto* values : {&averages.value, &averages.first, &averages.second}) values->assign(n, 0);
   for (std::size_t v = 0; v < n; ++v) {
     const double width = retraction_->width[v];
     if (!(measure_[v] > 0) || width == 0 || sum[v] >= 0) continue;
     const Barrier barrier(1 + sum[v] / measure_[v] / width);
     const double half = retraction_->stiffness[v] / 2;
-    result.value[v] = half * width * barrier.value;
-    result.first[v] = half * barrier.first;
-    result.second[v] = half / width * barrier.second;
+    averages.value[v] = half * width * barrier.value;
+    averages.first[v] = half * barrier.first;
+    averages.second[v] = half / width * barrier.second;
   }
-  return result;
+}
+
+/// Derivative of the energy over the scale by a point's gap.
+double AveragedContact::slope(const Point& point, const Gap& gap, const Averages& averages) const {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) sum += point.hats[k] * averages.first[pieces_[point.piece].owners[k]];
+  return gap.acts() ? point.weight * sum : 0;
 }
 
 double AveragedContact::value(ConstVectorView x, Workspace& workspace) const {
-  const Averages average = averages(gaps(x, workspace));
+  const Averages& averages = at(x, workspace).averages;
   double sum = 0;
   for (std::size_t v = 0; v < measure_.size(); ++v)
-    if (average.value[v] > 0) sum += measure_[v] * average.value[v];
+    if (averages.value[v] > 0) sum += measure_[v] * averages.value[v];
   return scale_ * sum;
 }
 
@@ -259,16 +253,13 @@ auto AveragedContact::pressed(const Point& point, const Gap& gap) const -> Press
 }
 
 auto AveragedContact::pressed_points(ConstVectorView x, Workspace& workspace) const -> std::vector<PressedPoint> {
-  const std::vector<Gap>& all = gaps(x, workspace);
-  const Averages average = averages(all);
+  const Cache& now = at(x, workspace);
   std::vector<PressedPoint> result;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (!all[i].acts()) continue;
-    double pressure = 0;
-    for (int k = 0; k < 3; ++k) pressure -= points_[i].hats[k] * average.first[pieces_[points_[i].piece].owners[k]];
-    if (pressure == 0) continue;
-    result.push_back(pressed(points_[i], all[i]));
-    result.back().force = points_[i].weight * pressure * all[i].first;
+    const double by_gap = slope(points_[i], now.gaps[i], now.averages);
+    if (by_gap == 0) continue;
+    result.push_back(pressed(points_[i], now.gaps[i]));
+    result.back().force = -by_gap * now.gaps[i].first;
   }
   return result;
 }
@@ -280,56 +271,55 @@ void AveragedContact::add_gradient(ConstVectorView x, VectorView gradient, Works
 }
 
 /// Adds W b'' grad y grad y^T of each vertex.
-void AveragedContact::add_hessian_of_averages(const std::vector<Gap>& gaps, const Averages& averages,
-                                              HessianSink& sink) const {
-  struct Entry {
+void AveragedContact::add_hessian_of_averages(const Cache& now, HessianSink& sink) const {
+  struct Part {
     int vertex;
-    std::size_t point;
     double weight;
+    PressedPoint point;
   };
-  std::vector<Entry> entries;
-  for (std::size_t i = 0; i < points_.size(); ++i)
+  std::vector<Part> parts;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    if (!now.gaps[i].acts()) continue;
+    const PressedPoint point = pressed(points_[i], now.gaps[i]);
     for (int k = 0; k < 3; ++k) {
       const int v = pieces_[points_[i].piece].owners[k];
-      const double weight = points_[i].weight * points_[i].hats[k] * gaps[i].first;
-      if (weight != 0 && averages.second[v] > 0) entries.push_back({v, i, weight});
+      const double weight = points_[i].weight * points_[i].hats[k] * now.gaps[i].first;
+      if (weight != 0 && now.averages.second[v] > 0) parts.push_back({v, weight, point});
     }
-  std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.vertex < b.vertex; });
+  }
+  std::stable_sort(parts.begin(), parts.end(), [](const Part& a, const Part& b) { return a.vertex < b.vertex; });
   std::vector<int> vertices;
   VectorX slope;  // W grad y
-  for (auto begin = entries.begin(); begin != entries.end();) {
+  for (auto begin = parts.begin(); begin != parts.end();) {
     const int v = begin->vertex;
-    const auto end = std::find_if(begin, entries.end(), [v](const Entry& entry) { return entry.vertex != v; });
+    const auto end = std::find_if(begin, parts.end(), [v](const Part& part) { return part.vertex != v; });
     vertices.clear();
-    for (auto it = begin; it != end; ++it) {
-      const PressedPoint p = pressed(points_[it->point], gaps[it->point]);
-      vertices.insert(vertices.end(), p.vertices.begin(), p.vertices.begin() + p.size);
-    }
+    for (auto it = begin; it != end; ++it)
+      vertices.insert(vertices.end(), it->point.vertices.begin(), it->point.vertices.begin() + it->point.size);
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
     slope.setZero(2 * std::ssize(vertices));
-    for (auto it = begin; it != end; ++it) {
-      const PressedPoint p = pressed(points_[it->point], gaps[it->point]);
-      for (int k = 0; k < p.size; ++k) {
-        const auto at = std::lower_bound(vertices.begin(), vertices.end(), p.vertices[k]) - vertices.begin();
-        slope.segment<2>(2 * at) += it->weight * p.coefficients[k] * p.normal;
+    for (auto it = begin; it != end; ++it)
+      for (int k = 0; k < it->point.size; ++k) {
+        const auto at = std::lower_bound(vertices.begin(), vertices.end(), it->point.vertices[k]) - vertices.begin();
+        slope.segment<2>(2 * at) += it->weight * it->point.coefficients[k] * it->point.normal;
       }
-    }
-    const MatrixX block = scale_ * averages.second[v] / measure_[v] * slope * slope.transpose();
+    const MatrixX block = scale_ * now.averages.second[v] / measure_[v] * slope * slope.transpose();
     sink.add<2>(vertices, block.data());
     begin = end;
   }
 }
 
 /// Second derivatives of the bounded gap of a point; the foot follows the place on the piece with the least gap.
-Mat<20> AveragedContact::curvature(const Point& point, const Gap& gap, const PressedPoint& pressed,
-                                   ConstVectorView x) const {
+auto AveragedContact::curvature(const Point& point, const Gap& gap, const PressedPoint& pressed, ConstVectorView x) const
+    -> Curvature {
   const CurvePiece &own = pieces_[point.piece], &foot = pieces_[gap.foot];
   const CurvePiece::Weights slope = foot.slope(gap.t);
   const Vec<2> along = foot.position(slope, x), bend = foot.position(foot.bend(), x);
   const Vec<2> across = along - gap.normal.dot(along) * gap.normal;
-  Vec<20> first = Vec<20>::Zero(), mixed = Vec<20>::Zero();  // of the distance; of t and the positions
-  Mat<20> hessian = Mat<20>::Zero();
+  // Derivatives of the distance; of t and the positions.
+  Vec<kMostDofs> first = Vec<kMostDofs>::Zero(), mixed = Vec<kMostDofs>::Zero();
+  Curvature hessian = Curvature::Zero();
   for (int k = 0; k < pressed.size; ++k) {
     first.segment<2>(2 * k) = pressed.coefficients[k] * gap.normal;
     mixed.segment<2>(2 * k) = -pressed.coefficients[k] * across;
@@ -345,20 +335,17 @@ Mat<20> AveragedContact::curvature(const Point& point, const Gap& gap, const Pre
 }
 
 void AveragedContact::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace& workspace) const {
-  const std::vector<Gap>& all = gaps(x, workspace);
-  const Averages average = averages(all);
-  add_hessian_of_averages(all, average, sink);
+  const Cache& now = at(x, workspace);
+  add_hessian_of_averages(now, sink);
+  using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostDofs, kMostDofs>;
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    if (!all[i].acts()) continue;
-    double force = 0;
-    for (int k = 0; k < 3; ++k)
-      force += points_[i].weight * points_[i].hats[k] * average.first[pieces_[points_[i].piece].owners[k]];
-    if (force == 0) continue;
-    const PressedPoint p = pressed(points_[i], all[i]);
+    const double by_gap = slope(points_[i], now.gaps[i], now.averages);
+    if (by_gap == 0) continue;
+    const PressedPoint p = pressed(points_[i], now.gaps[i]);
     const int n = 2 * p.size;
-    MatrixX block = scale_ * force * curvature(points_[i], all[i], p, x).topLeftCorner(n, n);
+    Block block = scale_ * by_gap * curvature(points_[i], now.gaps[i], p, x).topLeftCorner(n, n);
     if (psd != PsdProjection::none) {
-      const Eigen::SelfAdjointEigenSolver<MatrixX> eigen(block);
+      const Eigen::SelfAdjointEigenSolver<Block> eigen(block);
       block = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * eigen.eigenvectors().transpose();
     }
     sink.add<2>(std::span(p.vertices.data(), p.size), block.data());

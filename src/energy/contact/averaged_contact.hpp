@@ -51,18 +51,20 @@ class AveragedContact final : public Energy {
     Vec<2> normal = Vec<2>::Zero();           ///< away from the other body
     bool acts() const { return first != 0; }
   };
-  struct Cache;
   struct Averages {
     std::vector<double> value, first, second;  ///< by vertex: of kappa / 2 w b, and its derivatives by y
   };
+  struct Cache;
   class GapFinder;
+  static constexpr int kMostDofs = 2 * PressedPoint::kMost;
+  using Curvature = Mat<kMostDofs>;  ///< of a point's dofs, in the leading rows and columns
 
-  const std::vector<Gap>& gaps(ConstVectorView x, Workspace& workspace) const;
-  Averages averages(const std::vector<Gap>& gaps) const;
-  double depth(const CurvePiece& piece, double t) const;
+  const Cache& at(ConstVectorView x, Workspace& workspace) const;
+  void average(const std::vector<Gap>& gaps, Averages& averages) const;
+  double slope(const Point& point, const Gap& gap, const Averages& averages) const;
   PressedPoint pressed(const Point& point, const Gap& gap) const;
-  void add_hessian_of_averages(const std::vector<Gap>& gaps, const Averages& averages, HessianSink& sink) const;
-  Mat<20> curvature(const Point& point, const Gap& gap, const PressedPoint& pressed, ConstVectorView x) const;
+  void add_hessian_of_averages(const Cache& now, HessianSink& sink) const;
+  Curvature curvature(const Point& point, const Gap& gap, const PressedPoint& pressed, ConstVectorView x) const;
 
   const CollisionSurface* surface_;
   const Retraction* retraction_;

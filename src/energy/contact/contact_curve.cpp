@@ -2,8 +2,8 @@
 #include "energy/contact/contact_curve.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
+#include <utility>
 
 #include "core/connected_parts.hpp"
 
@@ -92,28 +92,19 @@ std::vector<CurvePiece> curve_pieces(const CollisionSurface& surface, const Retr
 }
 
 double PlacedPiece::nearest(const Vec<2>& q) const {
-  constexpr int kSamples = 4, kMostIterations = 60;
+  constexpr int kSamples = 4;
   double t = 0, least = (q - c[0]).squaredNorm();
   for (int k = 1; k <= kSamples; ++k)
     if (const double squared = (q - at(double(k) / kSamples)).squaredNorm(); squared < least) {
       least = squared;
       t = double(k) / kSamples;
     }
-  const auto slope = [&](double s) { return (at(s) - q).dot(c[1] + 2 * s * c[2]); };  // of half the squared distance
-  double low = std::max(0.0, t - 1.0 / kSamples), high = std::min(1.0, t + 1.0 / kSamples);
+  const auto slope = [&](double s) { return (at(s) - q).dot(tangent(s)); };  // of half the squared distance
+  const double low = std::max(0.0, t - 1.0 / kSamples), high = std::min(1.0, t + 1.0 / kSamples);
   if (slope(low) >= 0) return low;
   if (slope(high) <= 0) return high;
-  for (int k = 0; k < kMostIterations; ++k) {
-    const double value = slope(t);
-    if (value == 0) break;
-    (value > 0 ? high : low) = t;
-    double next = t - value / ((c[1] + 2 * t * c[2]).squaredNorm() + 2 * (at(t) - q).dot(c[2]));
-    if (!(next > low && next < high)) next = (low + high) / 2;
-    const bool is_same = std::abs(next - t) <= 1e-15;
-    t = next;
-    if (is_same) break;
-  }
-  return t;
+  return bracketed_root(low, high, t,
+                        [&](double s) { return std::pair(slope(s), tangent(s).squaredNorm() + 2 * (at(s) - q).dot(c[2])); });
 }
 
 }  // namespace itr

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "energy/contact/retraction.hpp"
@@ -11,6 +12,25 @@
 #include "itr/types.hpp"
 
 namespace itr {
+
+/// The root in (low, high) of f, which is negative at low and positive at high, from t on: by Newton's method, halving where
+/// it leaves the bracket. f(t) returns value and derivative.
+template <typename F>
+double bracketed_root(double low, double high, double t, const F& f) {
+  constexpr int kMostIterations = 60;
+  constexpr double kSame = 1e-15;
+  for (int k = 0; k < kMostIterations; ++k) {
+    const auto [value, derivative] = f(t);
+    if (value == 0) break;
+    (value > 0 ? high : low) = t;
+    double next = t - value / derivative;
+    if (!(next > low && next < high)) next = (low + high) / 2;
+    const bool is_same = std::abs(next - t) <= kSame;
+    t = next;
+    if (is_same) break;
+  }
+  return t;
+}
 
 /// Positions c(t) = sum_i w_i(t) p_i, t in [0, 1], with quadratic weights w_i of vertices.
 struct CurvePiece {
@@ -45,6 +65,7 @@ std::vector<CurvePiece> curve_pieces(const CollisionSurface& surface, const Retr
 struct PlacedPiece {
   std::array<Vec<2>, 3> c;
   Vec<2> at(double t) const { return c[0] + t * (c[1] + t * c[2]); }
+  Vec<2> tangent(double t) const { return c[1] + 2 * t * c[2]; }
   /// The t in [0, 1] of the point nearest to q.
   double nearest(const Vec<2>& q) const;
 };
