@@ -395,11 +395,16 @@ TEST(Fluid, LeaksToWhereAnotherFluidIs) {
   constexpr int kWetRight = 15;
   itr::Setup<2> setup = seal<2>(4, 1, [](const Vec<2>&, double) { return 0.0; });
   setup.fluids.push_back({.place = "the other fluid", .wet = {{kRight, kWetRight}}});
+  const Mesh<2> dry = setup.mesh;
   for (const FacetId f : setup.mesh.live_facets()) {
     if (setup.mesh.facet_tag(f) == kBottom) setup.mesh.set_facet_tag(f, kWet);
     if (setup.mesh.facet_tag(f) == kRight) setup.mesh.set_facet_tag(f, kWetRight);
   }
-  EXPECT_EQ(reach_of_fluids(setup, setup.mesh).leaks, (std::vector<char>{1, 0}));
+  StepReport report;
+  const std::vector<std::string> warnings = report_fluids(setup, dry, setup.mesh, 0, report);
+  EXPECT_EQ(report.leaks, 1);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find(setup.fluids[0].place), std::string::npos);
 }
 
 TEST(Fluid, RefusesWhatCannotCome) {

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "eigenstrain.hpp"
+#include "fluids.hpp"
 #include "function.hpp"
 #include "mesh/facet_tags.hpp"
 #include "polyfem/python_value.hpp"
@@ -294,7 +295,7 @@ class ConditionReader {
       const auto press = [&](int tag) {
         if (!value.is_zero) load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
       };
-      if (const std::optional<Fluid> fluid = read_fluid(node, tags)) {
+      if (const std::optional<Fluid> fluid = read_fluid(node, tags, sets_, facet_tags_, setup_.fluids)) {
         std::vector<int>& named = setup_.names.surfaces["wet " + text_of(read_condition_label(node["id"]))];
         for (const auto& [before, wet] : fluid->wet) {
           press(wet);
@@ -307,31 +308,10 @@ class ConditionReader {
     }
   }
 
-  /// The fluid of a pressure that penetrates; nothing where it does not.
-  std::optional<Fluid> read_fluid(const Node& node, const std::vector<int>& tags) const {
-    if (!node["penetrates"].boolean(false)) {
-      for (const char* key : {"from", "leaks_to", "critical_pressure"})
-        if (node.has(key)) node[key].fail("it without a fluid", "\"penetrates\": true beside it");
-      return std::nullopt;
-    }
-    Fluid fluid{.place = node.pointer()};
-    for (const int tag : tags)
-      if (const auto found = sets_.surfaces.wet().find(tag); found != sets_.surfaces.wet().end()) fluid.wet.insert(*found);
-    for (const Fluid& other : setup_.fluids)
-      for (const auto& [before, wet] : other.wet)
-        if (fluid.wet.contains(before))
-          node["id"].fail(abbreviate(node["id"].json()) + ", of which the fluid of " + other.place + " has a part",
-                          "one fluid on a surface");
-    if (node.has("from")) fluid.from = surfaces_of(node["from"], "the surface that the fluid comes from");
-    if (node.has("leaks_to")) fluid.leaks_to = surfaces_of(node["leaks_to"], "the surface that the fluid leaks to");
-    if (node.has("critical_pressure")) fluid.critical_pressure = node["critical_pressure"].positive(1);
-    return fluid;
-  }
-
   void read_cavities() {
     std::set<std::string> names;
     for (const Node& node : boundary_["pressure_cavity"].items()) {
-      Cavity cavity{.surfaces = surfaces_of(node["id"], "the surfaces of the cavity"), .pressure = read_overpressure(node)};
+      Cavity cavity{.surfaces = surfaces_of_cavity(node["id"]), .pressure = read_overpressure(node)};
       cavity.name = read_curve_name(node, "cavity");
       if (!names.insert(cavity.name).second) node["name"].fail("a name that no cavity before it has");
       cavity.external_pressure = node["external_pressure"].non_negative(cavity.external_pressure);
@@ -345,8 +325,8 @@ class ConditionReader {
     }
   }
 
-  std::vector<int> surfaces_of(const Node& ids, const std::string& expected) const {
-    if (ids.items().empty()) ids.fail(expected);
+  std::vector<int> surfaces_of_cavity(const Node& ids) const {
+    if (ids.items().empty()) ids.fail("the surfaces of the cavity");
     std::set<int> tags;
     for (const Node& id : ids.items()) {
       const std::size_t before = tags.size();

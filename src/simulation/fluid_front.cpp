@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "simulation/fluid_front.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -8,6 +10,7 @@
 
 #include "geometry/measures.hpp"
 #include "itr/core.hpp"
+#include "mesh/facet_measure.hpp"
 #include "mesh/facet_tags.hpp"
 #include "simulation/contact_pressure.hpp"
 
@@ -17,9 +20,6 @@ namespace {
 
 constexpr double kOpen = 1e-3;    ///< of the critical pressure: contact of less is none
 constexpr double kMargin = 0.05;  ///< of the fluid's pressure: contact that shuts a wet facet presses by more
-
-double area(const std::array<Vec<2>, 2>& p) { return (p[1] - p[0]).norm(); }
-double area(const std::array<Vec<3>, 3>& p) { return inward_normal(p).norm() / 2; }
 
 template <int Dim>
 std::array<Vec<Dim>, Dim> rest_of(const Mesh<Dim>& mesh, FacetId f) {
@@ -115,8 +115,7 @@ class FluidSurface {
   double critical_pressure(double pressure) const { return fluid_.critical_pressure.value_or(std::max(pressure, 0.0)); }
   /// At rest, up to a factor.
   double rest_area(FacetId f) const {
-    const auto corners = rest_of(mesh_, f);
-    return area(corners) * (mesh_.is_axisymmetric() ? middle_of<Dim>(corners)[0] : 1);
+    return facet_measure(mesh_, f) * (mesh_.is_axisymmetric() ? middle_of<Dim>(rest_of(mesh_, f))[0] : 1);
   }
 
  private:
@@ -247,28 +246,34 @@ bool FluidFront<Dim>::move(Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView f
 }
 
 template <int Dim>
-FluidReach reach_of_fluids(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
-  FluidReach reach;
+std::vector<std::string> report_fluids(const StepSetup<Dim>& setup, const Mesh<Dim>& before, const Mesh<Dim>& mesh, double t,
+                                       StepReport& report) {
+  std::vector<std::string> warnings;
   double wet = 0, all = 0;
   for (const Fluid& fluid : setup.fluids) {
     const FluidSurface<Dim> surface(setup, fluid, mesh);
-    reach.leaks.push_back(has_reached(surface, mesh, fluid.leaks_to));
     for (const FacetId f : mesh.live_facets()) {
       if (!surface.has(f)) continue;
       all += surface.rest_area(f);
       if (surface.is_wet(f)) wet += surface.rest_area(f);
     }
+    if (!has_reached(surface, mesh, fluid.leaks_to)) continue;
+    ++report.leaks;
+    if (!has_reached(FluidSurface<Dim>(setup, fluid, before), before, fluid.leaks_to))
+      warnings.push_back(fmt::format("the fluid of {} leaks from t = {} on: it has come to the surface of leaks_to",
+                                     fluid.place, setup.units.text(t, "s")));
   }
-  if (all > 0) reach.fraction = wet / all;
-  return reach;
+  if (all > 0) report.wetted = wet / all;
+  return warnings;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                  \
-  template std::set<int> known_tags(const StepSetup<Dim>&, const Mesh<Dim>&); \
-  template void wet_sources(const StepSetup<Dim>&, Mesh<Dim>&);               \
-  template void refuse_idle_fluids(const StepSetup<Dim>&, const Mesh<Dim>&);  \
-  template class FluidFront<Dim>;                                             \
-  template FluidReach reach_of_fluids(const StepSetup<Dim>&, const Mesh<Dim>&);
+#define ITR_INSTANTIATE(Dim)                                                                                         \
+  template std::set<int> known_tags(const StepSetup<Dim>&, const Mesh<Dim>&);                                        \
+  template void wet_sources(const StepSetup<Dim>&, Mesh<Dim>&);                                                      \
+  template void refuse_idle_fluids(const StepSetup<Dim>&, const Mesh<Dim>&);                                         \
+  template class FluidFront<Dim>;                                                                                    \
+  template std::vector<std::string> report_fluids(const StepSetup<Dim>&, const Mesh<Dim>&, const Mesh<Dim>&, double, \
+                                                  StepReport&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <set>
+#include <string>
 #include <vector>
 
+#include "itr/frame.hpp"
 #include "itr/setup.hpp"
 
 namespace itr {
@@ -45,12 +47,10 @@ class FluidFront {
   std::vector<int> rounds_left_;  ///< by fluid: in which it may leave facets
 };
 
-/// Where fluids are.
-struct FluidReach {
-  double fraction = 0;      ///< wet part of the rest area that they may wet
-  std::vector<char> leaks;  ///< by fluid: whether it has come to Fluid::leaks_to
-};
+/// Reports where fluids are on `mesh` after a step to t that began on `before`. Returns warnings of those that begin to
+/// leak.
 template <int Dim>
-FluidReach reach_of_fluids(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh);
+std::vector<std::string> report_fluids(const StepSetup<Dim>& setup, const Mesh<Dim>& before, const Mesh<Dim>& mesh, double t,
+                                       StepReport& report);
 
 }  // namespace itr

@@ -116,7 +116,7 @@ class StepSolver {
       report_.min_volume_ratio = min_volume_ratio(problem_->cells(), x_);
       if (setup_.fields.any_forces()) result.forces = problem_->forces(x_);
     }
-    tell_of_fluids();
+    for (const auto& warning : report_fluids(setup_, before_.mesh, next_.mesh, next_.t, report_)) warn(warning);
     next_.stored_energy = std::max(before_.stored_energy, report_.energy.elastic + report_.energy.contact);
     if (accuracy_.is_on()) {
       report_.dt = setup_.time.dt;
@@ -363,20 +363,6 @@ class StepSolver {
     next_.history.viscous = std::move(end.state);
     report_.viscous_dissipation = end.dissipation;
     report_.history_loss += end.loss;
-  }
-
-  /// Reports where fluids are, and says when one comes to where it should not.
-  void tell_of_fluids() {
-    if (setup_.fluids.empty()) return;
-    const FluidReach before = reach_of_fluids(setup_, before_.mesh), now = reach_of_fluids(setup_, next_.mesh);
-    report_.wetted = now.fraction;
-    for (std::size_t i = 0; i < now.leaks.size(); ++i) {
-      if (!now.leaks[i]) continue;
-      ++report_.leaks;
-      if (!before.leaks[i])
-        warn(fmt::format("the fluid of {} leaks from t = {} on: it has come to the surface of leaks_to",
-                         setup_.fluids[i].place, setup_.units.text(next_.t, "s")));
-    }
   }
 
   /// Warns where faces that are no contact begin to be pressed into each other.
