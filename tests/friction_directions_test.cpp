@@ -220,6 +220,7 @@ TEST(FrictionDirections, ABlockSticksWithinTheEllipseThenSlidesAsTheConvexPotent
     }
   }
   EXPECT_GE(pull_at(began), most);
+  // The force that is free, the part that friction falls by, needs about ten steps for that speed.
   EXPECT_LE(pull_at(began), most + 12 * kPullRate * setup.time.dt);
   const Vec<2> expected = predicted(kFlat + most / kPullRate, simulation.state().t);
   EXPECT_LE((velocity() - expected).norm(), 0.02 * expected.norm())
