@@ -171,7 +171,7 @@ class Quotes(unittest.TestCase):
     def test_ratios_to_the_reference(self):
         scenes = ["cantilever", "masticator h=0.1", "ball-wall 2D to t=0.0024", "ball-wall 3D to t=0.00132", "masticator 3D to t=1.1",
                   "twisting-beam to t=0.2, tolerance 10"]
-        page = (SOURCE / "verification/paper/README.md").read_text().partition("## What the table shows")[0]
+        page = (SOURCE / "verification/paper/README.md").read_text().partition("## Findings")[0]
         rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in page.splitlines() if line.startswith("| ")]
         found = {row[0]: row for row in rows if row[0] in scenes and len(row) > 5}
         self.assertEqual(set(found), set(scenes))
@@ -181,10 +181,10 @@ class Quotes(unittest.TestCase):
             self.assertIn("{} and {} times as fast".format(*in_2d), (SOURCE / page).read_text().replace("\n", " "))
         text = (SOURCE / "docs/user-guide.md").read_text()
         # A ratio of a window with few steps in contact is told with their number.
-        told = (SOURCE / "verification/paper/README.md").read_text().partition("## What the table shows")[2].partition("\n## ")[0]
+        findings = (SOURCE / "verification/paper/README.md").read_text().partition("## Findings")[2].partition("\n## ")[0]
         for name in ["ball-wall 3D to t=0.00132", "masticator 3D to t=1.1"]:
             touching, steps = found[name][5].split(",")[0], found[name][1].split()[0]
-            self.assertIn(f"| {ratios[name]} | {touching} of {steps} |", told)
+            self.assertIn(f"| {ratios[name]} | {touching} of {steps} |", findings)
         self.assertEqual(found["twisting-beam to t=0.2, tolerance 10"][5], "none")
         for name in ["masticator h=0.1", "ball-wall 3D to t=0.00132"]:
             self.assertIn(f"{1000 * float(found[name][2]):.0f} ms", text)
