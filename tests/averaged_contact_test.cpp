@@ -179,6 +179,9 @@ TEST(AveragedContact, IsChosenWhereBodiesSlideThatConditionsHold) {
   };
   EXPECT_TRUE(is_chosen(two_rings()));
   itr::Setup<2> other = two_rings();
+  other.fields.error_bars = true;
+  EXPECT_TRUE(is_chosen(other)) << "who asks for bars asks for no other result";
+  other = two_rings();
   other.dirichlet.clear();
   EXPECT_FALSE(is_chosen(other));
   other = two_rings();

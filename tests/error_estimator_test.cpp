@@ -5,9 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include "energy/contact/retraction.hpp"
 #include "itr/simulation.hpp"
 #include "itr/solver.hpp"
 #include "mesh/refine.hpp"
+#include "rings.hpp"
 #include "simulation_scenes.hpp"
 
 namespace itr {
@@ -154,15 +156,101 @@ TEST(ErrorEstimator, SaysWhyThereIsNoBar) {
   EXPECT_TRUE(result.errors.sources.empty());
 }
 
+/// A quarter of a ring that is widened within another one, by averaged gaps.
+itr::Setup<2> widened() {
+  itr::Setup<2> setup = quarter_rings({{0.4, 0.6, 6, 2}, {0.602, 0.8, 7, 2}});
+  for (const FacetId f : setup.mesh.live_facets()) {
+    const auto& [a, b] = setup.mesh.facet(f);
+    const double radius = (setup.mesh.rest(a).norm() + setup.mesh.rest(b).norm()) / 2;
+    if (radius < 0.42) setup.mesh.set_facet_tag(f, 3);
+    if (radius > 0.78) setup.mesh.set_facet_tag(f, 4);
+  }
+  for (const int body : {1, 2}) setup.materials[body] = {.youngs_modulus = 1e6, .poisson_ratio = 0.3, .density = 1};
+  setup.dirichlet.push_back({3, {true, true}, [](const Vec<2>& X, double) { return Vec<2>(0.05 * X); }});
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  setup.contact = {.enabled = true, .dhat = 1e-4, .average_gaps = true, .convergent = true};
+  setup.fields.reaction_forces = setup.fields.contact_forces = true;
+  setup.fields.curves = {{.name = "inner", .surfaces = {3}}};
+  setup.fields.points = {{.name = "corner", .rest = {0.8, 0, 0}}};
+  setup.fields.error_bars = true;
+  setup.choose_defaults();
+  EXPECT_TRUE(setup.proxy);
+  return setup;
+}
+
+TEST(ErrorEstimator, HasTheDerivativeByTheWidthOfAveragedGaps) {
+  constexpr double kChange = 1e-3;
+  itr::Setup<2> setup = widened();
+  const Outcome here = run(setup);
+  auto retraction = std::make_shared<Retraction>(*setup.proxy->retraction);
+  for (double& width : retraction->width) width *= 1 - kChange;
+  setup.proxy->retraction = retraction;
+  const Outcome narrower = run(setup);
+  const double energy = (narrower.energy - here.energy) / kChange;
+  EXPECT_NEAR(here.errors.energy[kDhat], energy, 0.02 * std::abs(energy));
+}
+
+/// Blocks without Poisson's effect that a motion presses together evenly: the solution is linear in each. Curves of the
+/// finer space must feel the pressure on their edges, or bars would tell of points that dent. A disc far away makes the
+/// surfaces retract.
+TEST(ErrorEstimator, FindsNothingUnderEvenPressureOfAveragedGaps) {
+  constexpr int kAround = 12, kColumns = 21;
+  std::vector<Vec<2>> rest;
+  std::vector<std::array<int, 3>> cells;
+  std::vector<int> bodies;
+  for (const int body : {1, 2}) {
+    const int first = static_cast<int>(rest.size());
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < kColumns; ++i) rest.emplace_back(0.04 * i, 0.05 * j + (body == 2 ? 0.101 : 0));
+    for (int j = 0; j < 2; ++j)
+      for (int i = 0; i + 1 < kColumns; ++i) {
+        const int a = first + kColumns * j + i;
+        cells.push_back({a, a + 1, a + kColumns + 1});
+        cells.push_back({a, a + kColumns + 1, a + kColumns});
+      }
+    bodies.insert(bodies.end(), 4 * (kColumns - 1), body);
+  }
+  const int center = static_cast<int>(rest.size());
+  rest.emplace_back(0, 5);
+  for (int i = 0; i < kAround; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kAround;
+    rest.emplace_back(0.2 * std::cos(angle), 5 + 0.2 * std::sin(angle));
+    cells.push_back({center, center + 1 + i, center + 1 + (i + 1) % kAround});
+    bodies.push_back(3);
+  }
+  itr::Setup<2> setup;
+  setup.mesh = Mesh<2>(rest, cells, bodies);
+  for (const FacetId f : setup.mesh.live_facets()) {
+    const Vec<2> middle = (setup.mesh.rest(setup.mesh.facet(f)[0]) + setup.mesh.rest(setup.mesh.facet(f)[1])) / 2;
+    if (middle[1] == 0 || middle[1] > 1) setup.mesh.set_facet_tag(f, 1);
+    if (std::abs(middle[1] - 0.201) < 1e-9) setup.mesh.set_facet_tag(f, 2);
+  }
+  for (const int body : {1, 2, 3}) setup.materials[body] = {.youngs_modulus = 1e6, .poisson_ratio = 0, .density = 1};
+  setup.dirichlet = {{1, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, 0); }},
+                     {2, {true, true}, [](const Vec<2>&, double) { return Vec<2>(0, -0.003); }}};
+  setup.time = {.quasistatic = true, .dt = 1, .steps = 1};
+  setup.contact = {.enabled = true, .dhat = 1e-5, .average_gaps = true, .convergent = true};
+  setup.fields.reaction_forces = setup.fields.contact_forces = setup.fields.error_bars = true;
+  setup.fields.curves = {{.name = "top", .surfaces = {2}}};
+  setup.fields.points = {{.name = "corner", .rest = {0, 0.201, 0}}};
+  setup.choose_defaults();
+  ASSERT_TRUE(setup.proxy);
+  const Outcome outcome = run(setup);
+  ASSERT_GT(std::abs(outcome.force[1]), 1000);
+  EXPECT_LE(std::abs(outcome.errors.energy[kMesh]), 0.02 * outcome.energy);
+  EXPECT_LE(std::abs(outcome.curve.errors.at(kMesh)[3][1]), 0.02 * std::abs(outcome.force[1]));
+}
+
 TEST(ErrorEstimator, ChangesNoResult) {
-  itr::Setup<2> setup = pressed(4e-4);
-  const Outcome with = run(setup);
-  setup.fields.error_bars = false;
-  const Outcome without = run(setup);
-  EXPECT_EQ(with.energy, without.energy);
-  EXPECT_EQ(with.force, without.force);
-  EXPECT_FALSE(without.errors.is_asked);
-  EXPECT_TRUE(without.curve.errors.empty());
+  for (itr::Setup<2> setup : {pressed(4e-4), widened()}) {
+    const Outcome with = run(setup);
+    setup.fields.error_bars = false;
+    const Outcome without = run(setup);
+    EXPECT_EQ(with.energy, without.energy);
+    EXPECT_EQ(with.force, without.force);
+    EXPECT_FALSE(without.errors.is_asked);
+    EXPECT_TRUE(without.curve.errors.empty());
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -207,11 +208,72 @@ std::vector<Mat<Dim>> inverse_blocks(const FinerSpace<Dim>& space, const DofMap&
 /// Why errors of such a step cannot be estimated; empty: they can.
 template <int Dim>
 std::string why_unknown(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
-  if (setup.proxy) return "contact acts on another surface than the mesh's";
+  if (setup.proxy && !setup.proxy->retraction) return "contact acts on another surface than the mesh's";
   if (setup.follower.forces) return "forces of the program follow its own nodes";
   if (setup.lump_mass) return "the mass is lumped";
   if (has_closed_faces(mesh)) return "faces that coincide at rest are closed";
   return {};
+}
+
+/// Barycentric coordinates at rest of a point in the best of these cells, with its vertices.
+struct PointOfCell {
+  std::array<VertexId, 3> vertices;
+  Vec<3> weights;
+};
+PointOfCell locate(const Mesh<2>& mesh, std::span<const CellId> cells, const Vec<2>& X) {
+  PointOfCell best{{}, Vec<3>::Constant(-std::numeric_limits<double>::infinity())};
+  for (const CellId c : cells) {
+    const auto& [i, j, k] = mesh.cell(c);
+    Mat<2> edges;
+    edges << mesh.rest(j) - mesh.rest(i), mesh.rest(k) - mesh.rest(i);
+    const Vec<2> at = edges.inverse() * (X - mesh.rest(i));
+    const Vec<3> weights(1 - at.sum(), at[0], at[1]);
+    if (weights.minCoeff() > best.weights.minCoeff()) best = {{i, j, k}, weights};
+  }
+  return best;
+}
+
+/// The weights of a retracted surface over the nodes of a finer space with curved edges: to positions on the mesh come those
+/// that the curves add along the surface, as means over the hats of its vertices.
+Eigen::SparseMatrix<double, Eigen::RowMajor> finer_weights(const CollisionProxy<2>& proxy, const Mesh<2>& mesh) {
+  constexpr double kGauss = 0.28867513459481287;  // half of 1 / sqrt(3)
+  std::vector<Eigen::Triplet<double>> entries;
+  std::vector<std::vector<CellId>> cells(proxy.rest.size());
+  for (int i = 0; i < proxy.weights.rows(); ++i)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, i); it; ++it) {
+      entries.emplace_back(i, static_cast<int>(it.col()), it.value());
+      const auto around = mesh.cells_of(static_cast<VertexId>(it.col()));
+      cells[i].insert(cells[i].end(), around.begin(), around.end());
+    }
+  std::vector<double> measure(proxy.rest.size(), 0);
+  const auto length = [&](const auto& edge) { return (proxy.rest[edge[0]] - proxy.rest[edge[1]]).norm(); };
+  for (const auto& edge : proxy.edges)
+    for (const int end : edge) measure[end] += length(edge) / 2;
+  for (const auto& edge : proxy.edges)
+    for (const double t : {0.5 - kGauss, 0.5 + kGauss}) {
+      const PointOfCell at = locate(mesh, cells[edge[0]], (1 - t) * proxy.rest[edge[0]] + t * proxy.rest[edge[1]]);
+      for (const int end : {0, 1}) {
+        const double share = (end == 0 ? 1 - t : t) * length(edge) / 2 / measure[edge[end]];
+        for (int k = 0; k < 3; ++k) {
+          const VertexId a = at.vertices[k], b = at.vertices[(k + 1) % 3];
+          const double curve = 4 * share * at.weights[k] * at.weights[(k + 1) % 3];
+          entries.emplace_back(edge[end], mesh.node_of(a, b), curve);
+          for (const VertexId v : {a, b}) entries.emplace_back(edge[end], v, -curve / 2);
+        }
+      }
+    }
+  Eigen::SparseMatrix<double, Eigen::RowMajor> weights(proxy.weights.rows(), mesh.num_nodes());
+  weights.setFromTriplets(entries.begin(), entries.end());
+  return weights;
+}
+
+/// The setup of the steps in a finer space.
+template <int Dim>
+StepSetup<Dim> finer_setup(const StepSetup<Dim>& setup, const FinerSpace<Dim>& space) {
+  StepSetup<Dim> finer = setup;
+  if constexpr (Dim == 2)
+    if (finer.proxy) finer.proxy->weights = finer_weights(*setup.proxy, space.mesh);
+  return finer;
 }
 
 /// Changes by d-hat, friction's velocity, lagging and the solver on the mesh itself, by ErrorSource. Gradients at x are
@@ -372,7 +434,8 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
   const FinerSpace<Dim>& space = *space_;
   const History history = finer_history(state);
   const VectorX fine_x = space.prolong(x);
-  StepProblem<Dim> fine(setup, space.mesh, history, state.t, cache_, problem.stiffness());
+  const StepSetup<Dim> finer = finer_setup(setup, space);
+  StepProblem<Dim> fine(finer, space.mesh, history, state.t, cache_, problem.stiffness());
   fine.lag_as(problem, fine_x);
   const auto at_fine_x = fine.gradients(fine_x);
   const Change change{at_fine_x.all - space.inject(at_x.all), at_fine_x.contact - space.inject(at_x.contact),

@@ -239,8 +239,7 @@ std::string retract(Setup<2>& setup) {
 
 template <int Dim>
 bool averaging_helps(const Setup<Dim>& setup) {
-  if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia() || setup.fields.error_bars)
-    return false;
+  if (!can_average_gaps(setup) || !setup.contact.has_friction() || setup.time.has_inertia()) return false;
   const std::vector<char> held = held_dofs(setup, setup.mesh, setup.time.t0).held;
   std::set<int> parts, held_parts;
   for (const VertexId v : setup.mesh.live_vertices()) {

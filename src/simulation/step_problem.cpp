@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "diagnosis.hpp"
+#include "energy/contact/averaged_contact.hpp"
 #include "energy/elastic/patched_volume.hpp"
 #include "energy/follower.hpp"
 #include "energy/mapped.hpp"
@@ -380,18 +381,29 @@ typename StepProblem<Dim>::Gradients StepProblem<Dim>::gradients(const VectorX& 
   return found;
 }
 
-/// Pressures stay as they are where gaps shrink with d-hat: in the plain form they go with its third power.
+/// Pressures stay as they are where gaps, or averaged overlaps, shrink: in the plain form they go with the third power of
+/// d-hat.
 template <int Dim>
 typename StepProblem<Dim>::TermAt StepProblem<Dim>::contact_at(const VectorX& x, double factor) {
   ContactOptions options = terms_.contact;
   options.dhat *= factor;
   const double stiffness = stiffness_.value / (options.convergent ? 1 : factor * factor * factor);
-  const auto contact = std::make_shared<ContactEnergy<Dim>>(surface_.surface, options, stiffness, terms_.scaling);
-  std::shared_ptr<const Energy> term = contact;
-  if (surface_.map) term = std::make_shared<MappedEnergy<Dim>>(contact, surface_.map);
+  TermAt at{0, VectorX::Zero(x.size())};
   Workspace workspace;  // searches of the problem's own are of its d-hat
-  TermAt at{term->value(x, workspace), VectorX::Zero(x.size())};
-  term->add_gradient(x, at.gradient, workspace);
+  const auto add = [&](std::shared_ptr<const Energy> term) {
+    if (surface_.map) term = std::make_shared<MappedEnergy<Dim>>(term, surface_.map);
+    at.value += term->value(x, workspace);
+    term->add_gradient(x, at.gradient, workspace);
+  };
+  const CollisionSurface& surface = surface_.surface;
+  add(std::make_shared<ContactEnergy<Dim>>(surface, options, stiffness, terms_.scaling));
+  if (surface.retraction) {
+    CollisionSurface narrower = surface;
+    auto retraction = std::make_shared<Retraction>(*surface.retraction);
+    for (double& width : retraction->width) width *= factor;
+    narrower.retraction = retraction;
+    add(std::make_shared<AveragedContact>(narrower, terms_.scaling));
+  }
   return at;
 }
 
