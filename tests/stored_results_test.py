@@ -138,6 +138,8 @@ class Stored(unittest.TestCase):
         text = (folder / "README.md").read_text()
         for table in (page.equal_table(rows, references), page.references_table(references), page.runs_table(rows)):
             self.assertIn(table, text)
+        referee = [*csv.DictReader((folder / "referee.csv").read_text().splitlines())]
+        self.assertIn(page.referee_table(referee), text)
         self.assertIn("In {1} of these {0} rows".format(*page.count_first(rows, references)), text)
         # An error that is small by chance counts as much as that of the next finer mesh.
         levels = [("0.1", "0.2"), ("1", "-0.001"), ("10", "0.05")]

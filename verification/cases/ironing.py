@@ -32,25 +32,26 @@ def grid(counts):
     return points, np.array(cells)
 
 
-def die(h):
+def die(h, height, gap):
     """Between the round foot and the flat top of a die at x = 2."""
     half = np.arcsin(FOOT / 2 / RADIUS)
     points, cells = grid([max(4, round(2 * half * RADIUS / h)), max(3, round(FOOT / h))])
     angle = (2 * points[:, 0] - 1) * half
     foot = np.stack([RADIUS * np.sin(angle), RADIUS * (1 - np.cos(angle))], axis=1)
-    top = np.stack([FOOT * (points[:, 0] - 0.5), np.full(len(points), TOP)], axis=1)
-    points = foot + points[:, 1:] * (top - foot) + [2, HEIGHT + GAP]
+    top = np.stack([FOOT * (points[:, 0] - 0.5), np.full(len(points), height)], axis=1)
+    points = foot + points[:, 1:] * (top - foot) + [2, HEIGHT + gap]
     return points, cells
 
 
-def iron(context, name, h, h_die, averages="auto", friction=0.3):
+def ironing_scene(folder, name, h, h_die, averages="auto", friction=0.3, height=TOP, gap=GAP):
+    """Meshes in the folder, and the scene."""
     points, cells = grid([round(WIDTH / h), round(HEIGHT / h)])
-    for body, (points, cells) in (("base", (points * [WIDTH, HEIGHT], cells)), ("die", die(h_die))):
-        write_mesh(context.folder / f"{name}-{body}.msh", points, cells, np.full(len(cells), 1 + (body == "die")))
-    low, high = [[-1, -1], [WIDTH + 1, 1e-6]], [[0, HEIGHT + GAP + TOP - 1e-6], [WIDTH, 2 * HEIGHT]]
-    content = {
+    for body, (points, cells) in (("base", (points * [WIDTH, HEIGHT], cells)), ("die", die(h_die, height, gap))):
+        write_mesh(folder / f"{name}-{body}.msh", points, cells, np.full(len(cells), 1 + (body == "die")))
+    low, high = [[-1, -1], [WIDTH + 1, 1e-6]], [[0, HEIGHT + gap + height - 1e-6], [WIDTH, 2 * HEIGHT]]
+    return {
         "defaults": "itr",
-        "geometry": [{"mesh": str(context.folder / f"{name}-{body}.msh"), "volume_selection": k, "surface_selection": [{"id": k, "box": box}]}
+        "geometry": [{"mesh": str(folder / f"{name}-{body}.msh"), "volume_selection": k, "surface_selection": [{"id": k, "box": box}]}
                      for body, k, box in (("base", 1, low), ("die", 2, high))],
         "materials": [{"id": k, "type": "NeoHookean", "E": young, "nu": 0.32, "rho": 1, "plane_strain": True}
                       for k, young in ((1, 6.896e8), (2, 6.896e9))],
@@ -58,6 +59,10 @@ def iron(context, name, h, h_die, averages="auto", friction=0.3):
         "contact": {"enabled": True, "friction_coefficient": friction, "average_gaps": averages},
         "time": {"dt": 0.05, "tend": 5, "quasistatic": True},
         "output": {"forces": [{"name": "die", "surfaces": 2}], "paraview": {"skip_frame": 20}}}
+
+
+def iron(context, name, h, h_die, averages="auto", friction=0.3):
+    content = ironing_scene(context.folder, name, h, h_die, averages, friction)
     run = run_scene(context, name, content)
     with open(run.folder / "forces.csv", encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["name"] == "die"]

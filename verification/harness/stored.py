@@ -32,6 +32,7 @@ STORED = {
     "verification/adaptive/accuracy.csv": CODE,
     "verification/peers/results.csv": CODE,
     "verification/peers/references.csv": CODE,
+    "verification/peers/referee.csv": CODE,
     **{str(path.relative_to(ROOT)): CODE for path in sorted([*PAPER.glob("*/study.json"), *PAPER.glob("*/steps.csv")])},
 }
 # Tables that the report's cases and the studies write beside what STORED names, and runs that have a made of their own. Results of

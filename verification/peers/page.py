@@ -122,6 +122,20 @@ def draw(rows, path):
     plt.close(figure)
 
 
+def referee_table(rows):
+    """A row a quantity: what is published, and values with bars by level."""
+    by_quantity = {}
+    for row in rows:
+        by_quantity.setdefault((row["problem"], row["quantity"], row["published"]), {})[int(row["level"])] = row
+    lines = ["| problem | quantity | published | level 0 | level 1 | level 2 | largest sources on the finest |", "|---|---|---|---|---|---|---|"]
+    for key, levels in by_quantity.items():
+        if not key[2] and len(levels) == 1:
+            continue
+        words = [f"{levels[k]['value']} ± {levels[k]['bar'] or 'no bar'}" if k in levels else "" for k in range(3)]
+        lines.append(f"| {' | '.join((*key, *words, levels[max(levels)]['sources']))} |")
+    return "\n".join(lines)
+
+
 def put(text, name, table):
     begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
     before, rest = text.split(begin)
