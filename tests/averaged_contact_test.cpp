@@ -15,6 +15,7 @@
 #include "energy/contact/contact.hpp"
 #include "geometry/distance.hpp"
 #include "rings.hpp"
+#include "simulation/contact_pressure.hpp"
 
 namespace itr {
 namespace {
@@ -220,6 +221,32 @@ TEST(AveragedContact, ActsOfASurfaceInsideOfTheBodies) {
     EXPECT_LE(std::sqrt(nearest), 1.05 * depth[row]);  // farther from a corner that is concave
   }
   EXPECT_GT(*std::max_element(depth.begin(), depth.end()), 0.002);
+}
+
+/// Forces of the surface, brought back from the nodes that carry them: the even part of them exactly.
+TEST(AveragedContact, GivesItsForcesToTheBoundary) {
+  itr::Setup<2> setup = two_rings();
+  setup.choose_defaults();
+  ASSERT_TRUE(setup.proxy);
+  const CollisionProxy<2>& proxy = *setup.proxy;
+  VectorX force = VectorX::Zero(2 * setup.mesh.num_nodes());
+  const Vec<2> of_each(3, -2);
+  for (int row = 0; row < proxy.weights.rows(); ++row)
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator it(proxy.weights, row); it; ++it)
+      vertex_of<2>(force, static_cast<int>(it.col())) += it.value() * of_each;
+  const VectorX found = force_on_boundary(proxy, setup.mesh, force);
+  Vec<2> sum = Vec<2>::Zero();
+  double inside = 0;
+  for (VertexId v = 0; v < setup.mesh.num_vertices(); ++v) {
+    const Vec<2> at = vertex_of<2>(found, v);
+    sum += at;
+    if (!setup.mesh.is_boundary(v)) {
+      EXPECT_EQ(at.norm(), 0);
+      inside += vertex_of<2>(force, v).norm();
+    }
+  }
+  EXPECT_GT(inside, 1);
+  EXPECT_LE((sum - static_cast<double>(proxy.weights.rows()) * of_each).norm(), 1e-12 * sum.norm());
 }
 
 }  // namespace

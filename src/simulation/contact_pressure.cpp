@@ -77,6 +77,28 @@ VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorVi
 }
 
 template <int Dim>
+VectorX force_on_boundary(const CollisionProxy<Dim>& retracted, const Mesh<Dim>& mesh, ConstVectorView force) {
+  using Row = typename Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator;
+  std::vector<VertexId> boundary;
+  for (VertexId v = 0; v < mesh.num_vertices(); ++v)
+    if (mesh.is_boundary(v)) boundary.push_back(v);
+  std::vector<double> weight(mesh.num_nodes(), 0);  // of nodes inside, over all rows
+  const auto for_each_inside = [&](const auto& visit) {
+    for (int row = 0; row < retracted.weights.rows(); ++row)
+      for (Row it(retracted.weights, row); it; ++it)
+        if (const auto v = static_cast<VertexId>(it.col()); !mesh.is_boundary(v)) visit(row, v, it.value());
+  };
+  for_each_inside([&](int, VertexId v, double value) { weight[v] += value; });
+  VectorX result = force;
+  for_each_inside([&](int row, VertexId v, double value) {
+    if (weight[v] == 0) return;
+    vertex_of<Dim>(result, boundary[row]) += value / weight[v] * vertex_of<Dim>(force, v);
+    vertex_of<Dim>(result, v).setZero();
+  });
+  return result;
+}
+
+template <int Dim>
 std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force,
                                                const std::function<bool(FacetId)>& take) {
   constexpr double kLeastTaken = 0.1;  // of what all have: a side that is hardly turned to the contact takes nothing
@@ -111,6 +133,7 @@ std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVecto
 
 #define ITR_INSTANTIATE(Dim)                                                                                  \
   template VectorX contact_pressure<Dim>(const Mesh<Dim>&, ConstVectorView, ConstVectorView);                 \
+  template VectorX force_on_boundary(const CollisionProxy<Dim>&, const Mesh<Dim>&, ConstVectorView);          \
   template std::vector<double> contact_pressure_on_facets(const Mesh<Dim>&, ConstVectorView, ConstVectorView, \
                                                           const std::function<bool(FacetId)>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

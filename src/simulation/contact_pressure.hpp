@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "itr/mesh.hpp"
+#include "itr/setup.hpp"
 #include "itr/types.hpp"
 
 namespace itr {
@@ -14,6 +15,11 @@ namespace itr {
 /// force on a curved edge is one of its ends', and its pressure their mean.
 template <int Dim>
 VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
+
+/// Contact forces on nodes, where they act on a surface behind the boundary: what nodes inside of a body carry is brought to
+/// the vertices of the boundary before them. The mesh's vertices on the boundary are those of the surface, in their order.
+template <int Dim>
+VectorX force_on_boundary(const CollisionProxy<Dim>& retracted, const Mesh<Dim>& mesh, ConstVectorView force);
 
 /// Contact force on each facet of a compact mesh by its present area [Pa], 0 where it pulls. The facets around a vertex have
 /// parts of its force as above; where some of them `take` it, which pressed facets do at the rim of contact, the others have
