@@ -75,6 +75,9 @@ TEST(CInterface, ResultantTakesNamesAndIdsAndRefusesOthers) {
   EXPECT_EQ(itr_resultant(block.simulation, "wall", about, force, &moment), ITR_SUCCESS);
   EXPECT_EQ(itr_resultant_of_id(block.simulation, 2, about, other, &moment), ITR_SUCCESS);
   EXPECT_GT(force[0], 0);  // the block pushes it away
+  std::vector<double> pressure(itr_num_nodes(block.simulation));
+  EXPECT_EQ(itr_get_contact_pressure(block.simulation, pressure.size(), pressure.data()), ITR_SUCCESS);
+  EXPECT_GT(*std::max_element(pressure.begin(), pressure.end()), 0);
   EXPECT_EQ(other[0], force[0]);
   EXPECT_EQ(itr_resultant_of_id(block.simulation, 7, about, force, &moment), ITR_BAD_INPUT);
   EXPECT_EQ(itr_resultant_of_id(nullptr, 2, about, force, &moment), ITR_BAD_INPUT);
@@ -157,6 +160,9 @@ TEST(CInterface, ChecksTheLengthsOfArrays) {
   EXPECT_EQ(itr_set_acceleration_values(s, 32, numbers.data()), ITR_SUCCESS);
   EXPECT_EQ(itr_set_forces(s, 32, numbers.data()), ITR_SUCCESS);
   EXPECT_EQ(itr_set_forces(s, 0, nullptr), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_eigenstrain(s, 16, numbers.data()), ITR_SUCCESS);
+  EXPECT_EQ(itr_set_eigenstrain(s, 15, numbers.data()), ITR_BAD_INPUT);
+  EXPECT_EQ(itr_set_eigenstrain(s, 0, nullptr), ITR_SUCCESS);
   EXPECT_EQ(itr_set_velocities(s, 32, numbers.data()), ITR_SUCCESS);
   EXPECT_EQ(itr_get_rest_positions(s, 32, numbers.data()), ITR_SUCCESS);
   EXPECT_EQ(itr_get_cells(s, 54, ids.data()), ITR_SUCCESS);

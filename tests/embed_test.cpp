@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -144,6 +145,53 @@ TEST(Facade, MovesObstaclesByArraysAndFunctions) {
     EXPECT_LT(xx, 0);
   }
   EXPECT_LE(simulation.as<2>().setup().obstacles.motions.size(), 3u);  // places are used again
+  const std::vector<double> pressure = simulation.contact_pressure();
+  simulation.as<2>().conditions().fields.contact_pressure = true;
+  simulation.as<2>().observe([&](const FrameView<2>& frame) {
+    const VectorX& asked = frame.asked->contact_pressure;
+    EXPECT_EQ(pressure, std::vector<double>(asked.begin(), asked.end()));
+  });
+  EXPECT_GT(*std::max_element(pressure.begin(), pressure.end()), 0);
+}
+
+TEST(Facade, EigenstrainOfAnArrayIsThatOfTheOptions) {
+  const auto moved = [](const char* options, bool by_array) {
+    Model model = block_model<2>();
+    model.set_options(options);
+    AnySimulation simulation(model);
+    if (by_array) {
+      std::vector<double> strains;
+      for (int v = 0; v < simulation.num_vertices(); ++v) strains.push_back(0.1 * simulation.rest_positions()[2 * v]);
+      simulation.set_eigenstrain(strains);
+    }
+    EXPECT_TRUE(simulation.step().ok);
+    return VectorX(simulation.as<2>().positions());
+  };
+  const VectorX rest = moved("{}", false), by_array = moved(kRemesh, true);
+  const VectorX by_options = moved(R"({"materials": {"type": "NeoHookean", "E": 1e5, "nu": 0.3, "rho": 1000,
+    "eigenstrain": "0.1 * x"}, "space": {"remesh": {"enabled": true, "split": {"acceptance_tolerance": 1e-4}}}})",
+                                   false);
+  ASSERT_EQ(by_array.size(), by_options.size());
+  EXPECT_LT((by_array - by_options).norm(), 1e-9 * by_options.norm());
+  EXPECT_GT((by_options.head(rest.size()) - rest).norm(), 1e-4);
+}
+
+TEST(Facade, EigenstrainKeepsToItsBodyAndIsRemoved) {
+  Model model(2);  // two squares that touch at x = 1
+  model.set_mesh(std::array{0., 0., 1., 0., 1., 1., 0., 1., 1., 0., 2., 0., 2., 1., 1., 1.},
+                 std::array{0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7}, std::array{1, 1, 2, 2});
+  model.set_options(kOptions);
+  AnySimulation simulation(model);
+  simulation.set_eigenstrain(std::array{0.01, 0.01, 0.01, 0.01, 0.02, 0.02, 0.02, 0.02});
+  const auto& materials = simulation.as<2>().setup().materials;
+  for (const int body : {1, 2}) {
+    const Mat<3> strain = materials.at(body).eigenstrain(Vec<3>(1, 0.4, 0), 0);
+    EXPECT_LT((strain - 0.01 * body * Mat<3>::Identity()).norm(), 1e-15);
+  }
+  EXPECT_EQ(message_of([&] { simulation.set_eigenstrain(std::array{1.0}); }), "strains: found 1 numbers; expected 8");
+  EXPECT_TRUE(materials.at(1).eigenstrain && materials.at(2).eigenstrain);
+  simulation.set_eigenstrain({});
+  EXPECT_FALSE(materials.at(1).eigenstrain || materials.at(2).eigenstrain);
 }
 
 /// A scene of a square (body 1, surface 8) on a ground (obstacle 2, named) after some steps.

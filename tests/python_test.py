@@ -207,6 +207,19 @@ class Conditions(unittest.TestCase):
         simulation.step()
         self.assertEqual(len(times), 3)
 
+    def test_eigenstrains(self):
+        results = []
+        for strain in (0.01, np.full(16, 0.01), lambda X, t: 0 * X[:, 0] + 0.01, None):
+            simulation = make_simulation(time={"quasistatic": True})
+            simulation.fix("left", [0, 0])
+            simulation.set_eigenstrain(strain)
+            simulation.step()
+            results.append(np.ptp(simulation.positions, axis=0))
+        for size in results[:3]:
+            np.testing.assert_allclose(size, results[0], rtol=1e-12)
+        self.assertGreater(results[0][0], 0.2 * 1.009)
+        np.testing.assert_allclose(results[3], 0.2, rtol=1e-12)
+
     def test_masks_and_forces(self):
         simulation = make_simulation()
         simulation.fix("left", [0, 0], mask=[True, False])
@@ -217,6 +230,7 @@ class Conditions(unittest.TestCase):
         self.assertEqual((force.shape, moment.shape), ((2,), (1,)))
         self.assertEqual(simulation.von_mises.shape, (18,))
         self.assertEqual(simulation.stress.shape, (18, 4))
+        np.testing.assert_array_equal(simulation.contact_pressure, np.zeros(16))
         np.testing.assert_allclose(simulation.forces("applied").sum(0), [0, 16])
         self.assertGreater(simulation.velocities[:, 1].min(), 0)
         self.assertEqual(simulation.forces("reaction").shape, (16, 2))

@@ -178,6 +178,9 @@ ITR_C_API itr_status itr_set_pressure_values(itr_simulation* simulation, const c
 ITR_C_API itr_status itr_set_acceleration(itr_simulation* simulation, itr_function acceleration, void* user);
 /** The same by an array, num_vertices * dimension, or by node. */
 ITR_C_API itr_status itr_set_acceleration_values(itr_simulation* simulation, size_t length, const double* accelerations);
+/** Sets the strain of the bodies where they are free of stress, the same in all directions: num_vertices numbers, or by
+ * node. NULL removes it, as it does one of the options. */
+ITR_C_API itr_status itr_set_eigenstrain(itr_simulation* simulation, size_t length, const double* strains);
 /** Moves an obstacle: displacement of its vertices from rest [m]. */
 ITR_C_API itr_status itr_move_obstacle(itr_simulation* simulation, const char* obstacle, itr_function displacement,
                                        void* user);
@@ -251,6 +254,8 @@ typedef enum itr_force {
 ITR_C_API itr_status itr_watch_forces(itr_simulation* simulation, int watched);
 /** Forces of one kind, num_nodes * dimension [N]; NULL before the first step in which they are watched. */
 ITR_C_API const double* itr_forces(const itr_simulation* simulation, itr_force kind);
+/** Copies the contact force by present area at each node, num_nodes numbers [Pa], in 2D [N/m]. Forces must be watched. */
+ITR_C_API itr_status itr_get_contact_pressure(itr_simulation* simulation, size_t length, double* pressure);
 /** Copies von Mises' equivalent stress, num_cells numbers [Pa]. */
 ITR_C_API itr_status itr_get_von_mises(itr_simulation* simulation, size_t length, double* von_mises);
 /** Copies Cauchy's stress, num_cells * dimension * dimension numbers, row by row [Pa]. */

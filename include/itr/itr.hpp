@@ -188,6 +188,10 @@ class ITR_EXPORT AnySimulation {
   void set_pressure(const std::string& boundary, std::span<const double> pressures);  ///< a number a vertex
   void set_acceleration(HostFunction acceleration);              ///< body force by mass [m/s^2]; null removes it
   void set_acceleration(std::span<const double> accelerations);  ///< dimension numbers a vertex
+  /// Sets the strain of the bodies where they are free of stress, the same in all directions (docs/theory.md,
+  /// "Eigenstrain"): a number a vertex, above -1, such as that of heat. An empty span removes it, as it does one of the
+  /// options.
+  void set_eigenstrain(std::span<const double> strains);
   /// Moves an obstacle by a displacement from rest [m].
   void move_obstacle(const std::string& obstacle, HostFunction displacement);
   /// Moves the vertices of an obstacle to positions at the end of the next steps [m], in the order of add_obstacle.
@@ -241,6 +245,8 @@ class ITR_EXPORT AnySimulation {
   Resultants resultant(const std::string& part) const;  ///< about the origin
   /// The resultant on the part with this id, whatever has it for its name; about the origin where no point is given.
   Resultants resultant(int id, std::span<const double> about = {}) const;
+  /// Contact force by present area at each node [Pa], in 2D [N/m]; below 0 where it pulls. Forces must be watched.
+  std::vector<double> contact_pressure() const;
   std::vector<double> elastic_density() const;  ///< by cell, of rest volume [J/m^Dim]
   std::vector<double> von_mises() const;        ///< by cell [Pa]
   std::vector<double> stress() const;           ///< Cauchy's by cell, dimension^2 numbers, row by row [Pa]

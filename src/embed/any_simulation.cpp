@@ -11,12 +11,14 @@
 #include "arrays.hpp"
 #include "core/parallel.hpp"
 #include "energy/energy.hpp"
+#include "energy/rigid_body.hpp"
 #include "fem/cell_set.hpp"
 #include "fem/locator.hpp"
 #include "host_term.hpp"
 #include "itr/energy.hpp"
 #include "named_parts.hpp"
 #include "simulation/cell_stress.hpp"
+#include "simulation/contact_pressure.hpp"
 #include "simulation/force_target.hpp"
 #include "simulation/resultant.hpp"
 
@@ -97,20 +99,19 @@ struct AnySimulation::Impl {
         refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
     /// Makes the function of values by vertex, linear on the cells of the present mesh, or by node, quadratic along its
-    /// curved edges.
+    /// curved edges. `of_body` finds cells of one body alone; null: all.
     template <int Components = Dim>
-    std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(const std::string& name,
-                                                                            std::span<const double> values) {
+    std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(
+        const std::string& name, std::span<const double> values, std::shared_ptr<const Locator<Dim>> of_body = nullptr) {
       const auto by_node = static_cast<std::size_t>(Components * mesh().num_nodes());
       const bool is_by_node = values.size() == by_node;
       check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().num_vertices()));
-      if (!locator || locator_revision != mesh().revision()) {
+      if (!of_body && (!locator || locator_revision != mesh().revision())) {
         locator = std::make_shared<Locator<Dim>>(mesh());
         locator_revision = mesh().revision();
       }
-      return [f = nodal_function<Dim>(locator, as_field(values), Components)](const RestPoint<Dim>& X, double) {
-        return Vec<Components>(f(X));
-      };
+      return [f = nodal_function<Dim>(of_body ? of_body : locator, as_field(values), Components)](
+                 const RestPoint<Dim>& X, double) { return Vec<Components>(f(X)); };
     }
     /// Puts a term in the place of the one of its name; a null one goes.
     void set_term(const std::string& name, TermFactory<Dim> term) {
@@ -320,6 +321,25 @@ void AnySimulation::set_acceleration(std::span<const double> accelerations) {
   });
 }
 
+void AnySimulation::set_eigenstrain(std::span<const double> strains) {
+  impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
+    std::map<int, std::vector<CellId>> cells;  // by body: others may have the same points at rest
+    for (CellId c = 0; c < d.mesh().cell_slots(); ++c) cells[d.mesh().body(c)].push_back(c);
+    for (auto& [body, material] : d.simulation.conditions().materials) {
+      if (rigid_body_of(material) || !cells.contains(body)) continue;
+      Eigenstrain eigenstrain;
+      if (!strains.empty()) {
+        const auto of_body = std::make_shared<Locator<Dim>>(d.mesh(), cells.at(body));
+        eigenstrain = [strain = d.template nodal<1>("strains", strains, of_body)](const Vec<3>& X, double t) -> Mat<3> {
+          return strain(Vec<Dim>(X.head<Dim>()), t)[0] * Mat<3>::Identity();
+        };
+      }
+      material.eigenstrain = std::move(eigenstrain);
+      material.eigenstrain_varies = !strains.empty();
+    }
+  });
+}
+
 namespace {
 
 /// Drops motions that no vertex has any more.
@@ -517,6 +537,14 @@ AnySimulation::Resultants AnySimulation::resultant(int id, std::span<const doubl
                     about.empty() ? std::span(origin).first(static_cast<std::size_t>(dimension())) : about);
 }
 
+std::vector<double> AnySimulation::contact_pressure() const {
+  return impl_->visit([]<int Dim>(const Impl::Of<Dim>& d) {
+    const VectorX& contact = d.simulation.forces().contact;
+    if (contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
+    const VectorX pressure = itr::contact_pressure<Dim>(d.mesh(), d.simulation.positions(), contact);
+    return std::vector<double>(pressure.begin(), pressure.end());
+  });
+}
 std::vector<double> AnySimulation::elastic_density() const {
   std::vector<double> values;
   impl_->visit([&](const auto& d) { d.simulation.observe([&](const auto& frame) { values = frame.elastic_density; }); });

@@ -259,6 +259,7 @@ ITR_ARRAY(itr_get_cells, int, cells, cells)
 ITR_ARRAY(itr_get_bodies, int, bodies, bodies)
 ITR_ARRAY(itr_get_facets, int, facets, facets)
 ITR_ARRAY(itr_get_facet_boundaries, int, ids, facet_boundaries)
+ITR_ARRAY(itr_get_contact_pressure, double, pressure, contact_pressure)
 ITR_ARRAY(itr_get_von_mises, double, von_mises, von_mises)
 ITR_ARRAY(itr_get_stress, double, stress, stress)
 
@@ -306,12 +307,16 @@ itr_status itr_move_obstacle_to(itr_simulation* simulation, const char* obstacle
     s.move_obstacle(obstacle, array("positions", positions, num_vertices * dimension_of(simulation)));
   });
 }
-itr_status itr_set_forces(itr_simulation* simulation, size_t length, const double* forces) {
-  return with(simulation, [&](itr::AnySimulation& s) {
-    if (forces && length == 0) throw itr::InputError({"", "forces", "a length of 0", "that of the array, or NULL"});
-    s.set_forces(forces ? std::span(forces, length) : std::span<const double>());
-  });
-}
+// Values at all vertices, which NULL removes.
+#define ITR_REMOVABLE_VALUES(FUNCTION, NAME, SET)                                                                 \
+  itr_status FUNCTION(itr_simulation* simulation, size_t length, const double* NAME) {                            \
+    return with(simulation, [&](itr::AnySimulation& s) {                                                          \
+      if (NAME && length == 0) throw itr::InputError({"", #NAME, "a length of 0", "that of the array, or NULL"}); \
+      s.SET(NAME ? std::span(NAME, length) : std::span<const double>());                                          \
+    });                                                                                                           \
+  }
+ITR_REMOVABLE_VALUES(itr_set_forces, forces, set_forces)
+ITR_REMOVABLE_VALUES(itr_set_eigenstrain, strains, set_eigenstrain)
 itr_status itr_set_follower_forces(itr_simulation* simulation, itr_force_function forces, itr_stiffness_function stiffness,
                                    void* user) {
   return with(simulation, [&](itr::AnySimulation& s) {

@@ -302,6 +302,7 @@ void add_simulation(py::module_& m) {
            [](AnySimulation& s, const Doubles& values) {
              with_values(values, 2, "acceleration", s.dimension(), [&](auto&& f) { s.set_acceleration(f); });
            })
+      .def("set_eigenstrain", [](AnySimulation& s, const Doubles& strains) { s.set_eigenstrain(view(strains)); })
       .def("move_obstacle", [](AnySimulation& s, const std::string& obstacle,
                                const Doubles& values) { s.move_obstacle(obstacle, view(values)); })
       .def("set_forces", [](AnySimulation& s, const Doubles& forces) { s.set_forces(view(forces)); })
@@ -330,6 +331,7 @@ void add_simulation(py::module_& m) {
       .def_property_readonly("facet_boundaries", [](const AnySimulation& s) { return copied(s.facet_boundaries(), 1); })
       .def_property_readonly("obstacle_positions",
                              [](const AnySimulation& s) { return copied(s.obstacle_positions(), s.dimension()); })
+      .def_property_readonly("contact_pressure", [](const AnySimulation& s) { return copied(s.contact_pressure(), 1); })
       .def_property_readonly("elastic_density", [](const AnySimulation& s) { return copied(s.elastic_density(), 1); })
       .def_property_readonly("von_mises", [](const AnySimulation& s) { return copied(s.von_mises(), 1); })
       .def_property_readonly("stress",

@@ -257,6 +257,16 @@ class Simulation:
         """Sets the body force by mass [m/s^2]."""
         self._set(("acceleration",), acceleration, self._simulation.set_acceleration)
 
+    def set_eigenstrain(self, strain: Optional[Value]) -> None:
+        """Sets the strain of the bodies where they are free of stress, the same in all directions, such as that of heat: a
+        number, or one a vertex. None removes it, as it does one of the options."""
+        if strain is None:
+            self._functions.pop(("eigenstrain",), None)
+            self._simulation.set_eigenstrain([])
+        else:
+            set_values = lambda e: self._simulation.set_eigenstrain(e if e.ndim else np.full(len(self.positions), e))
+            self._set(("eigenstrain",), strain, set_values)
+
     def move_obstacle(self, obstacle: str, positions: Union[Array, Callable[[float], Array]]) -> None:
         """Moves an obstacle to positions at the end of the next steps [m], or by a function of time that returns them."""
         if callable(positions):
@@ -372,6 +382,11 @@ class Simulation:
     @property
     def obstacle_positions(self) -> Array:
         return self._simulation.obstacle_positions
+
+    @property
+    def contact_pressure(self) -> Array:
+        """Contact force by present area (n,) [Pa], in 2D [N/m]; below 0 where it pulls. Forces must be watched."""
+        return self._simulation.contact_pressure
 
     @property
     def elastic_density(self) -> Array:
