@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers that scenes get which set no key of method: forces, slip and speed are right by defaults.
+"""Numbers that scenes get which set no key of method: forces, slip and speed are right by defaults; what runs report.
 
 python3 tests/defaults_test.py ITR SOURCE_FOLDER [NAME...]
 """
@@ -282,6 +282,87 @@ class Numbers(Case):
         with h5py.File(self.folder / "out/frames/000100.h5") as begin, h5py.File(self.folder / "out/frames/001100.h5") as end:
             creep = abs(end["fields/u"][:, 0] - begin["fields/u"][:, 0]).max()
         self.assertLess(creep, 1e-4 * length)
+
+
+class Reports(Case):
+    """What runs report of small scenes with closed forms, and what they refuse."""
+
+    def block(self, name="block.obj", **keys):
+        rectangle(self.folder / name, 1, 1, 4, 4)
+        return {"mesh": name, "volume_selection": 1, "surface_selection": {"threshold": 1e-6}, **keys}
+
+    def soft(self, **more):
+        return {"materials": {"type": "NeoHookean", "E": 1e4, "nu": 0.3, "rho": 1000}, **more}
+
+    def test_a_spring_of_a_rigid_body_has_its_force_in_its_curve(self):
+        block = self.block(rigid={"held": ["x", "rz"], "force": [0, -100]})
+        del block["volume_selection"]
+        rows = self.forces({"geometry": block, "springs": [{"id": 2, "stiffness": 1000, "name": "ground"}],
+                            "time": {"quasistatic": True, "dt": 1, "tend": 1},
+                            "output": {"forces": [{"name": "block", "bodies": 0}]}})[-2:]
+        of = {row["name"]: row for row in rows}
+        self.assertAlmostEqual(of["ground"]["all_y"], 100, delta=1e-6)
+        self.assertAlmostEqual(of["block"]["all_y"], 100, delta=1e-6)
+        self.assertAlmostEqual(of["block"]["body_y"], -100, delta=1e-6)
+
+    def test_increments_have_no_kinetic_energy(self):
+        held = [{"id": 2, "value": [0, 0]}, {"id": 4, "value": [0, "0.1 * t"]}]
+        scene = self.soft(geometry=self.block(), boundary_conditions={"dirichlet_boundary": held},
+                          time={"quasistatic": True, "dt": 0.1, "tend": 0.1},
+                          output={"paraview": {"options": {"kinetic_energy": True, "momentum": True}}})
+        self.run_scene(scene)
+        with h5py.File(self.folder / "out/frames/000001.h5") as frame:
+            self.assertEqual(frame["totals/kinetic_energy"][0], 0)
+            self.assertFalse(frame["totals/momentum"][:].any())
+            self.assertTrue(frame["fields/v"][:].any())
+
+    def test_a_rim_that_is_held_along_the_axis_bears_the_pressure_on_the_deformed_disc(self):
+        rectangle(self.folder / "disc.obj", 1, 0.2, 10, 2)
+        sides = [{"id": 3, "axis": "y", "position": 0.1999}, {"id": 2, "axis": "x", "position": 0.9999}]
+        rows = self.forces(self.soft(
+            geometry={"mesh": "disc.obj", "surface_selection": sides}, axisymmetric=True,
+            boundary_conditions={"dirichlet_boundary": [{"id": 2, "value": [0, 0], "dimension": [False, True]}],
+                                 "pressure_boundary": [{"id": 3, "value": 400}]},
+            output={"forces": [{"name": "disc", "bodies": 0}], "points": [{"name": "rim", "rest": [1, 0.2]}]}))
+        with open(self.folder / "out/points.csv") as file:
+            radius = float(list(csv.DictReader(file))[-1]["x"])
+        self.assertGreater(abs(radius - 1), 1e-3)
+        self.assertAlmostEqual(rows[-1]["reaction_y"] / (400 * math.pi * radius**2), 1, delta=1e-8)
+        self.assertAlmostEqual(rows[-1]["all_y"], 0, delta=1e-6)
+
+    def test_sums_of_laws_that_are_nearly_incompressible_end_where_solves_are_inexact(self):
+        box(self.folder / "cube.msh", (1e-3,) * 3, (1, 1, 1))
+        laws = [{"type": "IsochoricNeoHookean", "E": 5000, "nu": 0.3}, {"type": "VolumePenalty", "k": 1e10}]
+        sides = [{"id": 1, "axis": "-x", "position": 1e-5}, {"id": 2, "axis": "x", "position": 0.99e-3}]
+        held = [{"id": i, "value": [25e-6 * (i - 1), 0, 0], "dimension": [True, False, False]} for i in (1, 2)]
+        scene = {"defaults": "polyfem", "geometry": {"mesh": "cube.msh", "surface_selection": sides},
+                 "materials": {"type": "MaterialSum", "models": laws, "rho": 1}, "space": {"discr_order": 2},
+                 "boundary_conditions": {"dirichlet_boundary": held}, "time": {"dt": 0.2, "time_steps": 1},
+                 "solver": {"linear": {"solver": "eigen"}, "nonlinear": {"max_iterations": 500}}}
+        self.assertIn("nearly singular system were inexact", self.run_scene(scene))
+
+    def test_places_of_two_bodies_and_motions_of_nothing_held_are_refused(self):
+        pair = [self.block(), self.block(volume_selection=2, transformation={"translation": [1, 0]})]
+        held = {"dirichlet_boundary": [{"id": 1, "value": [0, 0]}]}
+        points = {"points": [{"name": "p", "rest": [1, 0]}]}
+        words = self.call("run", self.write(self.soft(geometry=pair, boundary_conditions=held, output=points)), status=2)
+        self.assertIn("/output/points/0/rest: found (1, 0) m, where bodies 1 and 2 both are", words)
+        point = {"id": 3, "held": ["x"], "motion": [0.1, 0.2]}
+        scene = self.soft(geometry=self.block(), boundary_conditions=held, couplings=[point])
+        self.assertIn("/couplings/0/motion/1: found 0.2, which has no effect", self.call("run", self.write(scene), status=2))
+
+    def test_rigid_bodies_that_overlap_are_named(self):
+        rigid = [self.block(rigid={"held": held}, transformation={"translation": [0.1 * i, 0.9 * i]})
+                 for i, held in enumerate((["x", "y", "rz"], ["x", "y"]))]
+        words = self.call("run", self.write({"geometry": rigid, "contact": {"enabled": True, "initial_overlap": "resolve"},
+                                             "time": {"quasistatic": True, "dt": 1, "tend": 1}}), status=2)
+        self.assertIn("which are rigid and are not free to part", words)
+        self.assertNotIn("line search", words)
+
+    def test_explain_leaves_out_averaged_gaps_where_they_are_off(self):
+        scene = self.soft(geometry=self.block(), contact={"enabled": True, "friction_coefficient": 0.2})
+        self.assertIn("/contact/average_gaps", self.call("explain", self.write(scene)))
+        self.assertNotIn("/contact/average_gaps", self.call("explain", self.write({**scene, "space": {"discr_order": 2}})))
 
 
 if __name__ == "__main__":

@@ -27,19 +27,21 @@ class Convergence {
   /// Which test a full step passes, if one: its length, its decrement, or that nothing is left to improve.
   std::optional<Termination> test(const Step& step) {
     if (!held_.is_done()) {
-      unresolved_ = 0;
+      unresolved_ = creeping_ = 0;
       return {};
     }
     if (step.is_of_shift) return {};
     if (has_small_step(step)) return Termination::step;
     if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
-    if (has_ceased_to_improve(step)) return Termination::round_off;
+    if (has_ceased_to_improve(step) || creeps(step)) return Termination::round_off;
     return {};
   }
   /// Whether the forces that are left are their own round-off: what a solve that finds no better state may end with.
   bool is_at_round_off() const { return at_.gradient_norm() <= kFarAbove * at_.gradient_round_off(); }
   /// The norm of the gradient by that of its round-off, for a solve that ends without.
   double residual_by_round_off() const { return at_.gradient_norm() / at_.gradient_round_off(); }
+  /// Whether the solve ended since its steps were inexact.
+  bool is_creeping() const { return creeping_ >= kMostCreeping; }
   /// Counts the iterations in a row that hardly changed the energy.
   bool has_stalled(double value_before) {
     const bool hardly_changed = std::abs(at_.value() - value_before) < task_.options.energy_tolerance;
@@ -72,14 +74,16 @@ class Convergence {
   }
 
  private:
-  static constexpr double kNothing = 1e-10;     ///< see NewtonExtras::step_to_start
-  static constexpr double kVanishing = 1e-140;  ///< squares of smaller numbers are no numbers any more
-  static constexpr double kFloor = 8;           ///< times the round-off of the gradient: no step can be told to improve it
-  static constexpr double kFarAbove = 1e4;      ///< the same: a larger residual is an error, not round-off
-  static constexpr int kMostUnresolved = 20;    ///< steps in a row below the resolution of the energy
-  static constexpr int kMostStill = 4;          ///< of these, steps in a row after which the gradient had not shrunk
-  static constexpr double kShrunk = 0.9;        ///< fraction of the gradient that had shrunk last
-  static constexpr double kNear = 10;           ///< times a tolerance
+  static constexpr double kNothing = 1e-10;       ///< see NewtonExtras::step_to_start
+  static constexpr double kVanishing = 1e-140;    ///< squares of smaller numbers are no numbers any more
+  static constexpr double kFloor = 8;             ///< times the round-off of the gradient: no step can be told to improve it
+  static constexpr double kFarAbove = 1e4;        ///< the same: a larger residual is an error, not round-off
+  static constexpr int kMostUnresolved = 20;      ///< steps in a row below the resolution of the energy
+  static constexpr int kMostStill = 4;            ///< of these, steps in a row after which the gradient had not shrunk
+  static constexpr double kHardlyResolved = 100;  ///< times the round-off of the energy
+  static constexpr int kMostCreeping = 50;        ///< steps in a row that promise less
+  static constexpr double kShrunk = 0.9;          ///< fraction of the gradient that had shrunk last
+  static constexpr double kNear = 10;             ///< times a tolerance
 
   /// The forces that act are the measure, unless the options give another one for gradients.
   double force_asked() const {
@@ -116,6 +120,13 @@ class Convergence {
            unresolved_ >= kMostUnresolved;
   }
 
+  /// Steps by solves that a system near a singular one leaves inexact may promise a little more than the energy resolves
+  /// again and again.
+  bool creeps(const Step& step) {
+    creeping_ = at_.is_unresolved(step, kHardlyResolved) ? creeping_ + 1 : 0;
+    return is_creeping() && is_at_round_off();
+  }
+
   const Task& task_;
   const Iterate& at_;
   const DirichletContinuation& held_;
@@ -124,6 +135,7 @@ class Convergence {
   int unresolved_ = 0;      ///< steps in a row that promised less than the energy resolves, or that positions hide
   double last_shrunk_ = 0;  ///< gradient norm of the last of these where it was less than before
   int still_ = 0;           ///< of these, those since
+  int creeping_ = 0;        ///< steps in a row that promised hardly more than the energy resolves
   int stalled_ = 0;
 };
 

@@ -129,15 +129,15 @@ class Iterate {
     }
     return gradient_round_off_;
   }
-  /// Whether a step promises less than the energy resolves.
-  bool is_unresolved(const Step& step) const {
+  /// Whether a step promises less than so many times what the energy resolves.
+  bool is_unresolved(const Step& step, double times = 1) const {
     // Round-off costs as much as a gradient. It is asked for where the first one, and what forces have done since, leave it
     // open.
     constexpr double kSafe = 1e4;
     const double decrement = decrement_of(step);
     const bool is_open = value_round_off_at_ == kNone ||
                          decrement < kSafe * (first_round_off_ + std::numeric_limits<double>::epsilon() * work_);
-    return is_open && decrement < value_round_off();
+    return is_open && decrement < times * value_round_off();
   }
 
   double value_at(ConstVectorView x) const {

@@ -89,7 +89,8 @@ class Minimizer {
   NewtonSummary finish(Termination termination) {
     if (termination == Termination::round_off && !convergence_.is_at_round_off())
       return stop(Termination::no_descent, describe_residual());
-    return stop(saddle_.is_here() ? Termination::saddle : termination);
+    return stop(saddle_.is_here() ? Termination::saddle : termination,
+                convergence_.is_creeping() ? describe_inexact_solves() : std::string());
   }
 
   NewtonSummary stop(Termination termination, std::string_view message = {}) {
@@ -123,6 +124,13 @@ class Minimizer {
     std::ostringstream text;
     text << "no step lowers the forces that are left, which are " << convergence_.residual_by_round_off()
          << " times their round-off";
+    return text.str();
+  }
+
+  std::string describe_inexact_solves() const {
+    std::ostringstream text;
+    text << "linear solves of a nearly singular system were inexact, and left forces of "
+         << convergence_.residual_by_round_off() << " times their round-off; another linear solver may come nearer";
     return text.str();
   }
 

@@ -24,7 +24,15 @@ bool has_friction(const Node& root) {
   return has_contact(root) &&
          (contact["friction_coefficient"].non_negative(0) > 0 || !contact["friction_pairs"].items().empty());
 }
-bool slides_without_inertia(const Node& root) { return has_friction(root) && !is_dynamic(root); }
+bool is_of_order_2(const Node& root) {
+  return std::ranges::any_of(root["space"]["discr_order"].items(),
+                             [](const Node& order) { return (order.has("order") ? order["order"] : order).json() == 2; });
+}
+/// Whether coarse surfaces may slide as smooth ones do, as far as the scene alone tells (can_average_gaps).
+bool slides_without_inertia(const Node& root) {
+  return has_friction(root) && !is_dynamic(root) && !is_of_order_2(root) && !root["axisymmetric"].boolean(false) &&
+         !root["space"]["remesh"]["enabled"].boolean(false) && root["contact"]["friction_pairs"].items().empty();
+}
 bool has_open_stiffness(const Node& root) {
   return has_contact(root) && !root["solver"]["contact"].has("initial_barrier_stiffness");
 }

@@ -72,10 +72,18 @@ Spring read_spring(const Node& node, const Sets& sets, const std::set<int>& with
   return spring;
 }
 
-/// Reads what prescribes components of a motion, which has no effect on others.
-void require_held(const Node& node, const std::array<bool, 3>& held, const char* names) {
-  if (node.exists() && held == std::array<bool, 3>{})
-    node.fail(abbreviate(node.json()) + ", which has no effect", std::string("one of ") + names + " in `held` beside it");
+/// Checks what prescribes components of a motion, which has no effect on others. `names` are those of the components.
+void require_held(const Node& node, const std::array<bool, 3>& held, const std::vector<std::string>& names) {
+  if (!node.exists()) return;
+  if (held == std::array<bool, 3>{})
+    node.fail(abbreviate(node.json()) + ", which has no effect",
+              fmt::format("one of {} in `held` beside it", fmt::join(names, ", ")));
+  const std::vector<Node> components = node.items();
+  const std::size_t first = components.size() == 1 ? 2 : 0;  // a number is the turn about z
+  for (std::size_t i = 0; i < components.size() && first + i < held.size(); ++i)
+    if (!held[first + i] && components[i].json() != 0)
+      components[i].fail(abbreviate(components[i].json()) + ", which has no effect",
+                         fmt::format("0, or {} in `held` beside it", names[first + i]));
 }
 
 template <int Dim>
@@ -90,8 +98,8 @@ Coupling read_coupling(const Node& node, const Sets& sets, const std::set<int>& 
     coupling.point.head<Dim>() = Eigen::Map<const Vec<Dim>>(numbers.data());
   }
   read_held(node["held"], Dim, coupling.held_position, coupling.held_rotation);
-  require_held(node["motion"], coupling.held_position, "x, y, z");
-  require_held(node["turn"], coupling.held_rotation, "rx, ry, rz");
+  require_held(node["motion"], coupling.held_position, {"x", "y", "z"});
+  require_held(node["turn"], coupling.held_rotation, {"rx", "ry", "rz"});
   coupling.motion = read_vector<Dim>(node["motion"], setup.time, coupling.point);
   if (const FunctionOfTime turn = read_axial_vector(node["turn"], Dim, setup.time, coupling.point))
     coupling.turn = [turn](double t) { return Vec<3>(std::numbers::pi / 180 * turn(t)); };

@@ -16,6 +16,8 @@
 #include "energy/elastic/patched_volume.hpp"
 #include "energy/elastic/turned.hpp"
 #include "energy/inertia.hpp"
+#include "energy/rigid_body.hpp"
+#include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "fem/locator.hpp"
 #include "simulation/contact_pressure.hpp"
@@ -172,6 +174,24 @@ ForceCurvePoint curve_point(const Setup<Dim>& setup, const State<Dim>& state, co
   return point;
 }
 
+/// Whether a target is that of a spring on a rigid body.
+template <int Dim>
+bool is_spring_of_rigid(const Setup<Dim>& setup, const ForceTarget& target) {
+  return has_rigid_bodies(setup.materials) &&
+         std::ranges::any_of(springs_of<Dim>(setup.nodal_loads),
+                             [&](const auto& spring) { return spring->name == target.name; });
+}
+
+/// Forces without those on rigid bodies as wholes, which some of their nodes have in their place.
+template <int Dim>
+NodalForces without_wholes(NodalForces forces, const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+  for (const CellId c : mesh.live_cells())
+    if (rigid_body_of(setup.materials.at(mesh.body(c))))
+      for (const VertexId v : mesh.cell(c))
+        for (VectorX* kind : {&forces.reaction, &forces.body, &forces.residual}) kind->segment<Dim>(Dim * v).setZero();
+  return forces;
+}
+
 /// Gives curves the volume and the pressure of the cavity of their name.
 template <int Dim>
 void add_cavities(const Setup<Dim>& setup, const CellSet<Dim>& cells, const State<Dim>& state,
@@ -300,7 +320,10 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
   if (options.friction_forces) asked.forces.friction = all.friction;
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
-  for (const ForceTarget& target : options.curves) asked.curves.push_back(curve_point(setup, state, all, errors, target));
+  for (const ForceTarget& target : options.curves)
+    asked.curves.push_back(is_spring_of_rigid(setup, target)
+                               ? curve_point(setup, state, without_wholes(all, setup, state.mesh), errors, target)
+                               : curve_point(setup, state, all, errors, target));
   add_cavities(setup, frame.cells, state, asked.curves);
   asked.points = points_of(setup, state, errors);
   if (options.contact_pressure)
@@ -315,17 +338,19 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
     if (options.stretches) asked.stretches = std::move(stress.stretches);
   }
   if (!options.kinetic_energy && !options.momentum) return;
-  VectorX product = VectorX::Zero(data.v.size());
+  // Velocities of quasistatic steps are increments by time: nothing of the model has them.
+  const VectorX v = setup.time.has_inertia() ? data.v : VectorX::Zero(data.v.size());
+  VectorX product = VectorX::Zero(v.size());
   InertiaEnergy<Dim>(frame.cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,
-                     VectorX::Zero(data.v.size()))
-      .add_mass_product(data.v, product);
-  double energy = 0.5 * data.v.dot(product);
+                     VectorX::Zero(v.size()))
+      .add_mass_product(v, product);
+  double energy = 0.5 * v.dot(product);
   Vec<Dim> momentum = Vec<Dim>::Zero();
   for (Eigen::Index i = 0; i < product.size(); ++i) momentum[i % Dim] += product[i];
   for (const auto& surface : coupled_surfaces<Dim>(setup, frame.cells)) {
-    const Vec<Dim> v = surface.point().velocity(data.x, data.v);
-    energy += surface.coupling->mass / 2 * v.squaredNorm();
-    momentum += surface.coupling->mass * v;
+    const Vec<Dim> of_point = surface.point().velocity(data.x, v);
+    energy += surface.coupling->mass / 2 * of_point.squaredNorm();
+    momentum += surface.coupling->mass * of_point;
   }
   if (options.kinetic_energy) asked.kinetic_energy = {energy};
   if (options.momentum) asked.momentum.assign(momentum.begin(), momentum.end());

@@ -123,7 +123,10 @@ class OverlapResolver {
   double resolve() {
     const std::vector<Penetration<Dim>> penetrations = solids_.penetrations();
     refuse_obstacles();
-    for (const Penetration<Dim>& penetration : penetrations) refuse_deep(penetration);
+    for (const Penetration<Dim>& penetration : penetrations) {
+      refuse_deep(penetration);
+      if (is_rigid(penetration.solid) && is_rigid(penetration.in)) rigid_pair_ = describe(penetration);
+    }
     refuse_self_crossing();
     bool is_touching = !penetrations.empty() || has_intersection<Dim>(contact_.surface, y_);
     solids_.for_each_near(kTouching * setup_.contact.dhat, [&](const auto&, const auto&) { is_touching = true; });
@@ -154,9 +157,24 @@ class OverlapResolver {
       refuse(name_of(one) + " inside of " + name_of(other) + ", " + place(penetration.place), "bodies beside each other");
     const double thickness = std::min(one.thickness, other.thickness);
     if (penetration.depth <= kDeepest * thickness) return;
-    refuse(fmt::format("an overlap of {} and {} of {}, {}", name_of(one), name_of(other),
-                       setup_.units.text(penetration.depth, "m", kDigits), place(penetration.place)),
+    refuse(describe(penetration),
            fmt::format("at most half of the smaller thickness, which is {}", setup_.units.text(thickness, "m", kDigits)));
+  }
+
+  std::string describe(const Penetration<Dim>& penetration) const {
+    return fmt::format("an overlap of {} and {} of {}, {}", name_of(solids_.all()[penetration.solid]),
+                       name_of(solids_.all()[penetration.in]), setup_.units.text(penetration.depth, "m", kDigits),
+                       place(penetration.place));
+  }
+  bool is_rigid(std::size_t solid) const {
+    const Solid<Dim>& of = solids_.all()[solid];
+    return of.part != kNone && rigid_body_of(setup_.materials.at(of.body));
+  }
+  /// Names the rigid bodies that overlap, if any do, in place of why they were not parted.
+  void refuse_rigid_pair() const {
+    if (!rigid_pair_.empty())
+      refuse(rigid_pair_ + ", which are rigid and are not free to part",
+             "rigid bodies apart, or one of them that deforms or that nothing holds");
   }
 
   void refuse_self_crossing() const {
@@ -200,6 +218,7 @@ class OverlapResolver {
       if (!are_apart && round > 0) stiffness = std::min(kStiffer * stiffness, kMostStiffness);
       minimize_with(std::move(parting), round > kPatience ? VectorX(x) : start, x);
     }
+    refuse_rigid_pair();
     refuse(fmt::format("surfaces that stay {} in each other however they are pushed", setup_.units.text(worst, "m", 2)),
            "an overlap of bodies that are not held there, on cells that are larger than the overlap");
   }
@@ -270,6 +289,7 @@ class OverlapResolver {
     before.history.a.clear();
     before.history.v[0].setZero();
     const StepResult result = take_step(tools_.with(alone), before, after);
+    if (!result.ok) refuse_rigid_pair();
     if (!result.ok)
       refuse("an equilibrium of the interference that was not found: " + result.reason, "held bodies, or a smaller overlap");
     state_.history.x[0] = after.history.x[0];
@@ -300,7 +320,8 @@ class OverlapResolver {
   const StepSetup<Dim>& setup_;
   State<Dim>& state_;
   ContactSurface<Dim> contact_;
-  VectorX y_;  ///< positions at the start
+  VectorX y_;               ///< positions at the start
+  std::string rigid_pair_;  ///< two rigid bodies that overlap
   Solids<Dim> solids_;
 };
 

@@ -13,11 +13,13 @@
 
 #include "energy/cavity.hpp"
 #include "energy/mortar.hpp"
+#include "fem/locator.hpp"
 #include "itr/core.hpp"
 #include "mesh/facet_tags.hpp"
 #include "simulation/coupled_points.hpp"
 #include "simulation/fluid_front.hpp"
 #include "simulation/force_target.hpp"
+#include "simulation/named.hpp"
 #include "simulation/step_terms.hpp"
 
 namespace itr {
@@ -303,6 +305,28 @@ void check_nodes_of_couplings(const Setup<Dim>& setup) {
   }
 }
 
+/// Refuses points at places that two connected parts share, of which either may move away, unless ties hold them together.
+template <int Dim>
+void check_points(const Setup<Dim>& setup) {
+  constexpr double kRoundOff = 1e-9;
+  const Mesh<Dim>& mesh = setup.mesh;
+  for (std::size_t i = 0; i < setup.fields.points.size() && setup.ties.empty(); ++i) {
+    const Vec<Dim> X(setup.fields.points[i].rest.data());
+    CellId first = kNone;
+    for (const CellId c : mesh.live_cells()) {
+      const auto weights = barycentric_weights<Dim>(mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c), X);
+      if (*std::ranges::min_element(weights) < -kRoundOff) continue;
+      if (first == kNone) first = c;
+      if (mesh.part(c) == mesh.part(first)) continue;
+      const auto name = [&](CellId of) { return set_text(setup.names.bodies, mesh.body(of)); };
+      throw InputError({"", fmt::format("/output/points/{}/rest", i),
+                        fmt::format("{} {}, where bodies {} and {} both are", point_text<Dim>(X, setup.units, 6),
+                                    setup.units.length(), name(first), name(c)),
+                        "a place of one body, such as one a little inside of it"});
+    }
+  }
+}
+
 template <int Dim>
 void check_supports(const Setup<Dim>& setup) {
   const auto springs = springs_of<Dim>(setup.nodal_loads);
@@ -408,6 +432,7 @@ void Setup<Dim>::validate() const {
   check_ties(*this);
   check_rigid(*this);
   check_supports(*this);
+  check_points(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)
     refuse_unknown(this->fields.curves[i], mesh, known_tags(*this, mesh), this->obstacles.rest.size(),
                    element("fields.curves", i));

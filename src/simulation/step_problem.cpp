@@ -301,6 +301,10 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
   NodalForces forces;
   const FieldOptions& asked = setup_.fields;
   const bool all = !asked.curves.empty();
+  Lagged lagged = lagged_;
+  // A lagged part that acts on held components alone is still that of the start of the step.
+  if (lagged.pressure && !lagged.pressure->is_lagged(dofs_))
+    lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_.loads, x, terms_.scaling);
   const auto get = [&](const EnergySum& sum, VectorX& of_bodies, VectorX* of_obstacles) {
     VectorX gradient = VectorX::Zero(x.size());
     EnergyOfIncrement(sum, base_).add_gradient(increment, gradient, workspace_);
@@ -308,7 +312,7 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
     if (of_obstacles) *of_obstacles = -gradient.tail(x.size() - bodies) / terms_.scaling;
   };
   const auto add = [&](ForceEntry entry, EnergySum& sum) {
-    potential_.add_to(sum, lagged_, [&](const Traits& term) { return term.force == entry; });
+    potential_.add_to(sum, lagged, [&](const Traits& term) { return term.force == entry; });
   };
   EnergySum contact, friction, applied;
   add(ForceEntry::contact, contact);
@@ -324,9 +328,16 @@ NodalForces StepProblem<Dim>::forces(const VectorX& x) {
     body.add(std::make_shared<LoadEnergy<Dim>>(cells_, setup_.materials, Loads<Dim>{terms_.loads.acceleration, {}, {}},
                                                terms_.scaling));
     get(body, forces.body, nullptr);
+    EnergySum of_wholes;  // no loads of a surface
+    for (const auto& term : lagged.follower)
+      if (std::dynamic_pointer_cast<const RigidLoad<Dim>>(term)) of_wholes.add(term);
+    VectorX on_wholes;
+    get(of_wholes, on_wholes, nullptr);
+    forces.applied -= on_wholes;
+    forces.body += on_wholes;
   }
   if (!asked.reaction_forces && !all) return forces;
-  get(potential_.sum(lagged_), forces.residual, nullptr);
+  get(potential_.sum(lagged), forces.residual, nullptr);
   forces.reaction = VectorX::Zero(bodies);
   for (Eigen::Index i = 0; i < bodies; ++i)
     if (dofs_.unknown[i] == kNone) forces.reaction[i] = -std::exchange(forces.residual[i], 0.0);

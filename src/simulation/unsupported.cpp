@@ -33,6 +33,25 @@ bool has_couplings(const Setup<Dim>& setup) {
   return !couplings_of<Dim>(setup.nodal_loads).empty();
 }
 
+// Averaged gaps need straight lines in the plane that stay as they are, and nothing of contact that they do not know.
+
+template <int Dim>
+bool has_lasting_lines(const Setup<Dim>& setup) {
+  return Dim == 2 && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup);
+}
+template <int Dim>
+bool has_other_surfaces(const Setup<Dim>& setup) {
+  return !setup.obstacles.rest.empty() || has_rigid_bodies(setup.materials) || (setup.proxy && !setup.proxy->retraction) ||
+         !setup.ties.empty() || setup.contact.resolve_overlap;
+}
+template <int Dim>
+bool has_other_contact(const Setup<Dim>& setup) {
+  const ContactOptions& contact = setup.contact;
+  return !contact.convergent || !contact.friction_pairs.empty() || contact.has_adhesion() || !setup.fluids.empty() ||
+         std::ranges::any_of(setup.damping,
+                             [](const auto& options) { return options.term == DampingOptions::Term::contact; });
+}
+
 template <int Dim>
 bool is_periodic(const Setup<Dim>& setup) {
   return std::ranges::any_of(setup.ties, [](const Tie& tie) { return static_cast<bool>(tie.jump); });
@@ -48,11 +67,14 @@ template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
+    {{"/contact/average_gaps", "averaged gaps in 3D, around an axis, of quadratic elements, or where the mesh changes"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !has_lasting_lines(setup); }},
+    {{"/contact/average_gaps", "averaged gaps with obstacles, rigid bodies, a collision mesh, ties, or overlaps to resolve"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && has_other_surfaces(setup); }},
     {{"/contact/average_gaps",
-      "averaged gaps in 3D or around an axis, where the mesh changes, of quadratic elements, or with obstacles, a "
-      "collision mesh, friction by pair, overlaps to resolve, ties, adhesion, damping of contact, rigid bodies, fluids that "
-      "penetrate or the plain form of contact"},
-     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !can_average_gaps(setup); }},
+      "averaged gaps with friction by pair, adhesion, damping of contact, fluids that penetrate, or the plain form of "
+      "contact"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && has_other_contact(setup); }},
     {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},
     {{"/contact/initial_overlap", "\"resolve\" with adhesion, which pulls on what is at rest"},
@@ -173,13 +195,7 @@ std::vector<UnsupportedCombination> unsupported_combinations() {
 
 template <int Dim>
 bool can_average_gaps(const Setup<Dim>& setup) {
-  const ContactOptions& contact = setup.contact;
-  const bool damps = std::ranges::any_of(
-      setup.damping, [](const DampingOptions& options) { return options.term == DampingOptions::Term::contact; });
-  const bool has_other_surface = (setup.proxy && !setup.proxy->retraction) || contact.resolve_overlap || !setup.ties.empty();
-  return Dim == 2 && contact.convergent && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup) &&
-         !has_other_surface && contact.friction_pairs.empty() && !contact.has_adhesion() && !damps &&
-         !has_rigid_bodies(setup.materials) && setup.fluids.empty() && setup.obstacles.rest.empty();
+  return has_lasting_lines(setup) && !has_other_surfaces(setup) && !has_other_contact(setup);
 }
 
 template <int Dim>
