@@ -54,6 +54,16 @@ class FitTest(unittest.TestCase):
         material = self.folder / "out/fit.json"
         return (json.loads(material.read_text()) if material.exists() else None), done
 
+    def test_semicolons_leave_commas_to_decimals(self):
+        words = self.made_by(yeoh([0.4]), uniaxial=UNIAXIAL)
+        wanted, _ = self.fit("Yeoh", "--terms", 1, *words)
+        words[1].write_text(words[1].read_text().replace(",", ";").replace(".", ","))
+        found, _ = self.fit("Yeoh", "--terms", 1, *words)
+        self.assertEqual(found, wanted)
+        words[1].write_text("stretch,stress\n1,0\n1,5,0,7\n")
+        _, done = self.fit("Yeoh", "--terms", 1, *words, status=2)
+        self.assertIn("row 2 below the first: found 1, 5, 0, 7", done.stderr)
+
     def test_yeoh_is_found_from_three_tests_and_its_bulk_modulus_from_a_fourth(self):
         J = np.linspace(0.9, 1, 6)
         squeezed = self.write("volume.csv", "J,pressure", J, 700 / 2 * (1 / J - J))

@@ -90,6 +90,12 @@ class Sweep(unittest.TestCase):
             self.assertIn("another sweep", refused.stderr)
             self.assertIn("sweep.json", refused.stderr)
 
+    def test_refuses_values_that_a_run_refuses(self):
+        for value, text in (("/materials/0/EE=1,2", "/materials/0/EE: found an unknown key"), ("/materials/0/nu=0.3,0.5", "/materials/0/nu: found 0.5")):
+            refused = sweep(SCENE, "-o", self.folder, *SMALL, "--vary", value, status=2)
+            self.assertIn(text, refused.stderr)
+            self.assertFalse(self.folder.exists())
+
     def test_refuses_what_it_cannot_read(self):
         for words, text in ((["--vary", "E=1,2"], "expected /json/pointer="), (["--vary", "/a="], "values between the commas"),
                             (["--vary", "/a=1", "--vary", "/a=2"], "a key twice")):

@@ -47,7 +47,10 @@ def read_table(path, names):
         lines = [line.split("#")[0].strip() for line in pathlib.Path(path).read_text().splitlines()]
     except OSError as error:
         fail(path, error.strerror, "a CSV file")
-    rows = [[word.strip() for word in line.replace(";", ",").split(",")] for line in lines if line]
+    lines = [line for line in lines if line]
+    if lines and ";" in lines[0]:  # the other form of CSV, in which a comma is a decimal point
+        lines = [line.replace(",", ".").replace(";", ",") for line in lines]
+    rows = [[word.strip() for word in line.split(",")] for line in lines]
     header = rows[0] if rows else []
     pair = next((pair for pair in names if set(pair) <= set(header)), None)
     if not pair:
@@ -56,6 +59,8 @@ def read_table(path, names):
     values = []
     for number, row in enumerate(rows[1:], start=1):
         try:
+            if len(row) > len(header):
+                raise ValueError
             values.append([float(row[c]) for c in columns])
         except (ValueError, IndexError):
             fail(f"{path}: row {number} below the first", ", ".join(row), f"numbers of {' and '.join(pair)}")

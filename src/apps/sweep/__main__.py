@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import shlex
+import subprocess
 import sys
 
 BAD_INPUT = 2  # exit status
@@ -92,6 +93,19 @@ def command_of(itr, options, folder, values):
     return shlex.join(words)
 
 
+def check(itr, options, runs):
+    """Refuses a sweep of which the command refuses a run: a key that is none would else show after the sweep."""
+    for values in runs:
+        settings = [*(f"{pointer}={json.dumps(value)}" for pointer, value in values.items()), *options.set]
+        words = [word for text in settings for word in ("--set", text)]
+        if options.defaults:
+            words += ["--defaults", options.defaults]
+        done = subprocess.run([itr, "explain", options.scene, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        if done.returncode == BAD_INPUT:
+            sys.stderr.write(done.stderr)
+            sys.exit(BAD_INPUT)
+
+
 def names_of(runs):
     width = len(str(len(runs) - 1))
     return [f"{number:0{width}}" for number in range(len(runs))]
@@ -114,6 +128,7 @@ def plan(itr, options):
     known = folder / "sweep.json"
     if known.exists() and json.loads(known.read_text()) != described:
         fail(f"{known}: another sweep; expected another folder (-o), or the same scene and values to go on")
+    check(itr, options, (runs[0], runs[-1]))
     folder.mkdir(parents=True, exist_ok=True)
     lines = [command_of(itr, options, folder / "runs" / name, values) for name, values in zip(names_of(runs), runs)]
     write_whole(known, json.dumps(described, indent=1) + "\n")
