@@ -541,7 +541,7 @@ std::vector<double> AnySimulation::contact_pressure() const {
   return impl_->visit([]<int Dim>(const Impl::Of<Dim>& d) {
     const VectorX& contact = d.simulation.forces().contact;
     if (contact.size() == 0) refuse("forces", "none", "forces that are watched, and a step since");
-    const VectorX pressure = itr::contact_pressure<Dim>(d.mesh(), d.simulation.positions(), contact);
+    const VectorX pressure = itr::contact_pressure<Dim>(d.simulation.setup(), d.mesh(), d.simulation.positions(), contact);
     return std::vector<double>(pressure.begin(), pressure.end());
   });
 }

@@ -99,6 +99,12 @@ VectorX force_on_boundary(const CollisionProxy<Dim>& retracted, const Mesh<Dim>&
 }
 
 template <int Dim>
+VectorX contact_pressure(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force) {
+  const bool is_retracted = setup.proxy && setup.proxy->retraction;
+  return contact_pressure(mesh, x, is_retracted ? force_on_boundary(*setup.proxy, mesh, force) : VectorX(force));
+}
+
+template <int Dim>
 std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force,
                                                const std::function<bool(FacetId)>& take) {
   constexpr double kLeastTaken = 0.1;  // of what all have: a side that is hardly turned to the contact takes nothing
@@ -131,10 +137,11 @@ std::vector<double> contact_pressure_on_facets(const Mesh<Dim>& mesh, ConstVecto
   return pressure;
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                  \
-  template VectorX contact_pressure<Dim>(const Mesh<Dim>&, ConstVectorView, ConstVectorView);                 \
-  template VectorX force_on_boundary(const CollisionProxy<Dim>&, const Mesh<Dim>&, ConstVectorView);          \
-  template std::vector<double> contact_pressure_on_facets(const Mesh<Dim>&, ConstVectorView, ConstVectorView, \
+#define ITR_INSTANTIATE(Dim)                                                                                    \
+  template VectorX contact_pressure(const Mesh<Dim>&, ConstVectorView, ConstVectorView);                        \
+  template VectorX contact_pressure(const StepSetup<Dim>&, const Mesh<Dim>&, ConstVectorView, ConstVectorView); \
+  template VectorX force_on_boundary(const CollisionProxy<Dim>&, const Mesh<Dim>&, ConstVectorView);            \
+  template std::vector<double> contact_pressure_on_facets(const Mesh<Dim>&, ConstVectorView, ConstVectorView,   \
                                                           const std::function<bool(FacetId)>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

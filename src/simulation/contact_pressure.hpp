@@ -16,8 +16,13 @@ namespace itr {
 template <int Dim>
 VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
 
-/// Contact forces on nodes, where they act on a surface behind the boundary: what nodes inside of a body carry is brought to
-/// the vertices of the boundary before them. The mesh's vertices on the boundary are those of the surface, in their order.
+/// The same for all contact of a setup. Where it acts on a retracted surface, what nodes inside of a body carry is brought
+/// to the vertices of the boundary before them.
+template <int Dim>
+VectorX contact_pressure(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
+
+/// Contact forces on nodes with those inside of bodies brought to the boundary, whose vertices are those of the retracted
+/// surface, in their order.
 template <int Dim>
 VectorX force_on_boundary(const CollisionProxy<Dim>& retracted, const Mesh<Dim>& mesh, ConstVectorView force);
 

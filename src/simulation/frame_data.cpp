@@ -326,10 +326,7 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
                                : curve_point(setup, state, all, errors, target));
   add_cavities(setup, frame.cells, state, asked.curves);
   asked.points = points_of(setup, state, errors);
-  if (options.contact_pressure)
-    asked.contact_pressure = contact_pressure(
-        state.mesh, data.x,
-        setup.proxy && setup.proxy->retraction ? force_on_boundary(*setup.proxy, state.mesh, all.contact) : all.contact);
+  if (options.contact_pressure) asked.contact_pressure = contact_pressure(setup, state.mesh, data.x, all.contact);
   if (options.von_mises || options.stress || options.pressure || options.stretches) {
     CellStress stress = stress_of<Dim>(frame, data.x, state.quadrature, setup);
     if (options.von_mises) asked.von_mises = std::move(stress.von_mises);
