@@ -16,8 +16,8 @@ namespace itr {
 template <int Dim>
 VectorX contact_pressure(const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
 
-/// The same for all contact of a setup. Where it acts on a retracted surface, what nodes inside of a body carry is brought
-/// to the vertices of the boundary before them.
+/// Contact pressure by all contact of a setup. Where it acts on a retracted surface, what nodes inside of a body carry is
+/// brought to the vertices of the boundary before them.
 template <int Dim>
 VectorX contact_pressure(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh, ConstVectorView x, ConstVectorView force);
 
