@@ -64,6 +64,8 @@ class Assemblies(unittest.TestCase):
         call("certify", self.folder / "solid")
         pressure = study.STUDIES["press_fit_3d"][0](self.folder / "solid")["pressure"]
         self.assertAlmostEqual(pressure / study.LAME["pressure"], 1, delta=0.4)  # facets sag by 0.4 of the overlap
+        warnings = json.loads((self.folder / "solid/summary.json").read_text())["warnings"]
+        self.assertTrue(any("mesh the round finer" in warning["text"] for warning in warnings))
 
     def test_short_ones_meet_their_references(self):
         for name, most in (("press_fit_axisymmetric", 0.5), ("shrink_fit", 0.5), ("laid_down", 1), ("rubber_mount", 3)):

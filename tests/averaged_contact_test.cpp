@@ -13,6 +13,7 @@
 #include "core/noise.hpp"
 #include "derivatives.hpp"
 #include "energy/contact/contact.hpp"
+#include "energy/support.hpp"
 #include "geometry/distance.hpp"
 #include "rings.hpp"
 #include "simulation/contact_pressure.hpp"
@@ -185,6 +186,12 @@ TEST(AveragedContact, IsChosenWhereBodiesSlideThatConditionsHold) {
   other = two_rings();
   other.dirichlet.clear();
   EXPECT_FALSE(is_chosen(other));
+  for (const int tag : {1, 2})  // all facets of a body, or of the other
+    other.nodal_loads.push_back(CouplingEntry<2>{std::make_shared<Coupling>(
+        Coupling{.surfaces = {tag}, .held_position = {true, true, false}, .held_rotation = {false, false, true}})});
+  for (const FacetId f : other.mesh.live_facets())
+    other.mesh.set_facet_tag(f, other.mesh.part_of_vertex(other.mesh.facet(f)[0]) == other.mesh.part_of_vertex(0) ? 1 : 2);
+  EXPECT_TRUE(is_chosen(other));
   other = two_rings();
   other.contact.friction_coefficient = 0;
   EXPECT_FALSE(is_chosen(other));

@@ -83,7 +83,8 @@ TEST(Interpolation, KnowsItsKinks) {
 }
 
 TEST(Expression, RefusesWhatItDoesNotKnow) {
-  for (const char* text : {"", "1 +", "foo(1)", "min(1)", "min(1, 2, 3)", "2 2", "sin()", "(1", "x = 1", "X", "1..2", "if"})
+  for (const char* text : {"", "1 +", "foo(1)", "min(1)", "min(1, 2, 3)", "2 2", "sin()", "(1", "x = 1", "X", "1..2", "if",
+                           "0,5*t", "sin(t) + (1,5)"})
     EXPECT_THROW(Expression{text}, ExpressionError) << text;
   EXPECT_THROW(Expression(std::string(100000, '(')), ExpressionError);
   try {

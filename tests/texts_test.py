@@ -58,6 +58,11 @@ FILES = {
     "named.msh": MSH + '$PhysicalNames\n3\n1 1 "root"\n1 2 "top"\n2 3 "plate"\n$EndPhysicalNames\n'
     "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
     "$Elements\n4\n1 1 2 1 1 4 1\n2 1 2 2 2 3 4\n3 2 2 3 1 1 2 3\n4 2 2 3 1 1 3 4\n$EndElements\n",
+    "comment.json": '{"time": {"dt": 1}, // seconds\n}\n',
+    "comma.json": '{"time": {"dt": 1},\n}\n',
+    "quote.json": "{'time': {'dt': 1}}\n",
+    "quads.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
+    "unused.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\nf 1 2 3\nf 1 3 4\n",
     "cut.json": '{\n  "geometry": [\n',
 }
 SQUARE = {

@@ -9,7 +9,7 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(std::string_view bytes, const std::filesystem::path& file) : line_(bytes, file) {}
+  ObjReader(std::string_view bytes, const std::filesystem::path& file) : line_(bytes, file), file_(file) {}
 
   MeshFile read() {
     while (line_.next()) read_line();
@@ -23,7 +23,9 @@ class ObjReader {
       read_vertex();
     } else if (keyword == "f") {
       const std::vector<int> corners = indices();
-      if (corners.size() != 3) line_.fail("a face with " + std::to_string(corners.size()) + " corners", "3: triangles only");
+      if (corners.size() != 3)
+        line_.fail("a face with " + std::to_string(corners.size()) + " corners",
+                   "3: triangles only" + (corners.size() == 4 ? "; " + split_advice(file_) : ""));
       mesh_.triangles.push_back({corners[0], corners[1], corners[2]});
     } else if (keyword == "l") {
       const std::vector<int> points = indices();
@@ -69,6 +71,7 @@ class ObjReader {
   }
 
   Lines line_;
+  std::filesystem::path file_;
   MeshFile mesh_;
 };
 

@@ -47,7 +47,7 @@ struct Element {
 
 class PlyReader {
  public:
-  PlyReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file) {}
+  PlyReader(std::string_view bytes, const std::filesystem::path& file) : in_(bytes, file), file_(file) {}
 
   MeshFile read() {
     for (const Element& element : read_header()) read_element(element);
@@ -112,7 +112,7 @@ class PlyReader {
         if (property.count_type) length = in_.count(integer(number(property.count_type)));
         if (is_wanted && length != (is_face ? 3 : 1))
           in_.fail("'" + property.name + "' with " + std::to_string(length) + " numbers",
-                   is_face ? "3: triangles only" : "one number");
+                   is_face ? "3: triangles only" + (length == 4 ? "; " + split_advice(file_) : "") : "one number");
         for (std::size_t k = 0; k < length; ++k) {
           const double value = number(property.type);
           if (is_wanted) values[is_face ? k : static_cast<std::size_t>(slot)] = value;
@@ -138,6 +138,7 @@ class PlyReader {
   }
 
   Cursor in_;
+  std::filesystem::path file_;
   MeshFile mesh_;
 };
 

@@ -22,6 +22,7 @@ constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
     {"poisson", "\"nu\""},
     {"poisson_ratio", "\"nu\""},
     {"poissons_ratio", "\"nu\""},
+    {"friction", "/contact/friction_coefficient"},
     {"gravity", "/boundary_conditions/rhs, which pushes in the negative direction,"},
 };
 
@@ -58,7 +59,8 @@ std::string name_by_meaning(const std::string& key, const std::string& pattern, 
       std::find_if(std::begin(kOtherNames), std::end(kOtherNames), [&](const auto& o) { return o.first == key; });
   if (other != std::end(kOtherNames))
     expected = std::string(other->second) + " perhaps; ";
-  else if (const std::string near = nearest_name(key, names); !near.empty())
+  else if (const std::string near = nearest_name(key, names), below = key_table().place_of(key);
+           !near.empty() && (near.find(key) != near.npos || !below.starts_with(pattern + "/")))
     expected = "\"" + near + "\" perhaps; ";
   else if (const std::string longer = longer_name(key, names); !longer.empty())
     expected = "\"" + longer + "\" perhaps; ";

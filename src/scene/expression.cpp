@@ -121,9 +121,15 @@ class ExpressionParser {
   }
 
  private:
+  bool is_between_digits(std::size_t at) const {
+    return at > 0 && at + 1 < text_.size() && is_digit(text_[at - 1]) && is_digit(text_[at + 1]);
+  }
+
+  /// Values of which the last counts. Between digits a comma would be meant as a decimal point.
   void list() {
     sum();
     while (take(',')) {
+      if (is_between_digits(position_ - 1)) --position_, fail("','", "'.': numbers have a decimal point");
       emit({Code::drop}, -1);
       sum();
     }

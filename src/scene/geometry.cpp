@@ -295,12 +295,12 @@ void read_body(const Node& geometry, const MeshFile& of_file, const References& 
   const MeshFile& file = has_files ? with_selections : of_mesh;
   std::vector<Vec<Dim>> points = points_of<Dim>(file);
   std::vector<typename Mesh<Dim>::Cell> cells = cells_of(file, Vec<Dim>());
+  const std::vector<int> renumbered = drop_unused<Dim>(points, cells);  // so that no box reaches to them
   const bool is_mirror = transform<Dim>(points, geometry);
   put_on_axis<Dim>(geometry, points);
   const Box<Dim> box = bounding_box<Dim>(points);
   check_connected<Dim>(geometry, points, cells);
   orient_cells<Dim>(geometry, points, is_mirror, cells, warnings);
-  const std::vector<int> renumbered = drop_unused<Dim>(points, cells);
   const std::string pointer = geometry["mesh"].pointer();
   if (const auto unused = std::count(renumbered.begin(), renumbered.end(), kNone); unused > 0)
     warnings.push_back(pointer + ": " + std::to_string(unused) + " vertices in no cell are left out");
@@ -326,7 +326,12 @@ int dimension_of(const Node& geometry, const MeshFile& file) {
 }  // namespace
 
 bool is_flat(const MeshFile& file) {
-  const Vec<3> extent = bounding_box<3>(file.vertices).sizes();
+  Box<3> box;  // of what is used, or of points alone
+  for (const auto& triangle : file.triangles)
+    for (const int v : triangle) box.extend(file.vertices[v]);
+  for (const auto& edge : file.edges)
+    for (const int v : edge) box.extend(file.vertices[v]);
+  const Vec<3> extent = (box.isEmpty() ? bounding_box<3>(file.vertices) : box).sizes();
   return extent[2] <= kFlat * extent.maxCoeff();
 }
 
@@ -336,6 +341,7 @@ std::filesystem::path MeshFiles::find(const Node& name, const char* what) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) {
     const auto here = std::filesystem::current_path(ignored) / name.string("");
+    if (std::filesystem::is_directory(path, ignored)) name.fail(abbreviate(name.json()) + ", which is a folder", what);
     name.fail(abbreviate(name.json()) + ", but there is no file '" + path.string() + "'" +
                   (here == path ? "" : ", nor '" + here.lexically_normal().string() + "'"),
               what);

@@ -155,6 +155,8 @@ std::vector<std::string> KeyTable::names_below(const std::string& pattern) const
 std::string KeyTable::place_of(const std::string& key) const {
   for (const auto& [pattern, entry] : entries_)
     if (entry.key->role != Role::removed && entry.key->role != Role::ignored && pattern.ends_with("/" + key)) return pattern;
+  for (const auto& [pattern, names] : children_)
+    if (pattern.ends_with("/" + key)) return pattern;
   return "";
 }
 

@@ -57,6 +57,21 @@ class ParsedPlace {
   std::vector<Level> levels_;
 };
 
+/// Expected instead of what a parser stops at (at `at`): other formats have comments, commas at ends and single quotes.
+std::string expected_at(const std::string& text, std::size_t at) {
+  const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
+  at = std::min(at, text.size());
+  while (at > 0 && (at == text.size() || is_space(text[at]))) --at;
+  const std::string_view seen(&text[at > 0 ? at - 1 : 0], at > 0 ? 2 : std::min<std::size_t>(1, text.size()));
+  if (seen.find('/') != seen.npos || seen.find('#') != seen.npos) return "JSON, which has no comments";
+  if (seen.find('\'') != seen.npos) return "JSON, whose texts are in double quotes";
+  std::size_t before = at;
+  while (before > 0 && is_space(text[before - 1])) --before;
+  if (before > 0 && text[before - 1] == ',' && (text[at] == '}' || text[at] == ']'))
+    return "JSON, which has no comma after the last entry";
+  return "JSON";
+}
+
 Json parse(const std::string& text, const fs::path& file) {
   ParsedPlace place(file.string());
   try {
@@ -69,7 +84,8 @@ Json parse(const std::string& text, const fs::path& file) {
     const auto line = 1 + std::count(text.begin(), end, '\n');
     std::string what = error.what();  // "[json.exception.parse_error.101] parse error at line 3, column 5: syntax error ..."
     if (const auto colon = what.find(": "); colon != std::string::npos) what = what.substr(colon + 2);
-    throw InputError({file.string(), "line " + std::to_string(line), what, "JSON"});
+    throw InputError(
+        {file.string(), "line " + std::to_string(line), what, expected_at(text, error.byte ? error.byte - 1 : 0)});
   } catch (const Json::out_of_range& error) {  // a number that no double holds
     const std::string_view what = error.what();
     const auto first = what.find('\''), last = what.rfind('\'');

@@ -2,6 +2,7 @@
 #include "node.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -109,6 +110,22 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
   return nearest;
 }
 
+std::string nearest_choice(std::string_view name, const std::vector<std::string>& choices) {
+  const auto letters = [](std::string_view word) {
+    std::string kept;
+    for (const char c : word)
+      if (std::isalnum(static_cast<unsigned char>(c)))
+        kept += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return kept;
+  };
+  const std::string wanted = letters(name);
+  for (const std::string& choice : choices)
+    if (const std::string known = letters(choice); !wanted.empty() && known == wanted) return choice;
+  for (const std::string& choice : choices)
+    if (wanted.size() >= 4 && letters(choice).find(wanted) != std::string::npos) return choice;
+  return wanted.size() < 3 ? "" : nearest_name(name, choices);  // all are near to shorter ones
+}
+
 Node Node::operator[](std::string_view key) const {
   const Json* member = nullptr;
   if (json_ && json_->is_object()) {
@@ -175,7 +192,10 @@ int Node::choice(const std::vector<std::string>& names, int fallback) const {
   if (!json_) return fallback;
   const std::string name = json_->is_string() ? json_->get<std::string>() : "";
   const auto found = std::find(names.begin(), names.end(), name);
-  if (!json_->is_string() || found == names.end()) fail("one of " + quoted_list(names));
+  if (!json_->is_string() || found == names.end()) {
+    const std::string near = nearest_choice(name, names);
+    fail((near.empty() ? "" : "\"" + near + "\" perhaps; ") + ("one of " + quoted_list(names)));
+  }
   return static_cast<int>(found - names.begin());
 }
 

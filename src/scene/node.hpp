@@ -48,6 +48,9 @@ std::string list_ids(const std::vector<int>& ids);
 /// The candidate with the least edit distance; empty if none is close enough to be meant.
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates);
 
+/// Finds among a few words the same but for case and signs, or one that contains the name, or the nearest.
+std::string nearest_choice(std::string_view name, const std::vector<std::string>& choices);
+
 class Node {
  public:
   explicit Node(const Document& document) : Node(document, &document.json, "") {}

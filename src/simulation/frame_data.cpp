@@ -227,7 +227,10 @@ std::vector<PointValue> points_of(const Setup<Dim>& setup, const State<Dim>& sta
     PointValue& point = points.emplace_back();
     point.name = target.name;
     point.u = point.x = at(state.history.x[0]);
-    for (int c = 0; c < Dim; ++c) point.u[c] -= X[c];
+    // Beside chords of a round, and near them, the point that moves is the nearest one.
+    for_each_weight<Dim>(place, [&](int node, double weight) {
+      for (int c = 0; c < Dim; ++c) point.u[c] -= weight * state.mesh.rest(node)[c];
+    });
     for (const auto& source : errors.sources) point.errors.push_back(at(source.displacement));
     if (setup.fields.error_bars && point.errors.empty())
       point.errors.assign(kErrorSources, std::vector<double>(Dim, std::numeric_limits<double>::quiet_NaN()));

@@ -20,7 +20,8 @@ std::string pressed_faces(const Overlap<Dim>& overlap, double dhat, const Units&
   const Vec<Dim> place = overlap.place / units.factor("m");
   return fmt::format(
       "faces that coincide at rest are pressed into each other, by {}more than d-hat, {}, at ({:.4g}): contact acts between "
-      "them only once they have been apart by d-hat; where they are to be pressed together, leave a gap between them",
+      "them only once they have been apart by d-hat; where they are to be pressed together, leave a gap between them, "
+      "or take \"contact\": {{\"initial_overlap\": \"resolve\"}} if they are of two bodies",
       std::isfinite(overlap.depth) ? units.text(overlap.depth, "m", 3) + ", " : "", units.text(dhat, "m", 3),
       fmt::join(place, ", "));
 }

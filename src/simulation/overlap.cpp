@@ -31,6 +31,7 @@ constexpr double kNoDepth = 1e-6;   ///< of the thickness: bodies touch
 constexpr double kDeepest = 0.5;    ///< of the thickness
 constexpr double kTouching = 1e-3;  ///< of d-hat: what is nearer is pushed apart, too
 constexpr double kGap = 0.5;        ///< of d-hat: between surfaces that are pushed apart
+constexpr double kLargeSag = 0.1;   ///< of the depth: pressures are worth a warning
 constexpr const char* kKey = "/contact/initial_overlap";
 
 [[noreturn]] void refuse(const std::string& found, const std::string& expected) {
@@ -309,11 +310,15 @@ class OverlapResolver {
     const auto deepest = std::ranges::max_element(penetrations, {}, &Penetration<Dim>::depth);
     if (deepest == penetrations.end()) return tools_.logger.info("initial overlap: surfaces touch; " + begins);
     const double sag = largest_sag(solids_, y_);
-    tools_.logger.info(fmt::format(
+    const std::string text = fmt::format(
         "initial overlap: surfaces overlap by up to {}, {}; {}. Of this overlap d-hat is {:.2g} %, and facets sag by up to "
         "{:.2g} %: pressures are off by about as much",
         units.text(deepest->depth, "m", kDigits), place(deepest->place), begins, 100 * setup_.contact.dhat / deepest->depth,
-        100 * sag / deepest->depth));
+        100 * sag / deepest->depth);
+    if (sag > kLargeSag * deepest->depth)
+      tools_.logger.warning(text + "; mesh the round finer: half as long facets sag a fourth");
+    else
+      tools_.logger.info(text);
   }
 
   const StepTools<Dim>& tools_;

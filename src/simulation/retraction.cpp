@@ -15,6 +15,7 @@
 
 #include "energy/contact/averaged_contact.hpp"
 #include "energy/contact/retraction.hpp"
+#include "energy/support.hpp"
 #include "mesh/cell_of_facet.hpp"
 #include "simulation/closed_faces.hpp"
 #include "simulation/contact_surface.hpp"
@@ -247,6 +248,12 @@ bool averaging_helps(const Setup<Dim>& setup) {
     parts.insert(part);
     if (std::any_of(&held[Dim * v], &held[Dim * v] + Dim, [](char is_held) { return is_held != 0; }))
       held_parts.insert(part);
+  }
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads)) {
+    if (!coupling->is_held()) continue;
+    for (const FacetId f : setup.mesh.live_facets())
+      if (std::ranges::find(coupling->surfaces, setup.mesh.facet_tag(f)) != coupling->surfaces.end())
+        held_parts.insert(setup.mesh.part_of_vertex(setup.mesh.facet(f)[0]));
   }
   return parts == held_parts;
 }

@@ -44,6 +44,7 @@ std::string element(const char* list, std::size_t index) { return fmt::format("{
 
 void check_time(const TimeOptions& time) {
   require_positive("/time/dt", time.dt);
+  require(std::isnormal(time.dt * time.dt), "/time/dt", time.dt, "a length of which a double holds the square");
   require(true, "/time/t0", time.t0, "a number");
   require_at_least("/time/time_steps", time.steps, 1);
   require(time.bdf_order >= 1 && time.bdf_order <= 6, "/time/integrator/steps", time.bdf_order, "1 to 6");

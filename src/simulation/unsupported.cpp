@@ -2,6 +2,7 @@
 #include "unsupported.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include "energy/elastic/law_table.hpp"
 #include "energy/rigid_body.hpp"
@@ -33,25 +34,6 @@ bool has_couplings(const Setup<Dim>& setup) {
   return !couplings_of<Dim>(setup.nodal_loads).empty();
 }
 
-// Averaged gaps need straight lines in the plane that stay as they are, and nothing of contact that they do not know.
-
-template <int Dim>
-bool has_lasting_lines(const Setup<Dim>& setup) {
-  return Dim == 2 && !setup.mesh.is_axisymmetric() && !setup.remesh.enabled && !may_curve(setup);
-}
-template <int Dim>
-bool has_other_surfaces(const Setup<Dim>& setup) {
-  return !setup.obstacles.rest.empty() || has_rigid_bodies(setup.materials) || (setup.proxy && !setup.proxy->retraction) ||
-         !setup.ties.empty() || setup.contact.resolve_overlap;
-}
-template <int Dim>
-bool has_other_contact(const Setup<Dim>& setup) {
-  const ContactOptions& contact = setup.contact;
-  return !contact.convergent || !contact.friction_pairs.empty() || contact.has_adhesion() || !setup.fluids.empty() ||
-         std::ranges::any_of(setup.damping,
-                             [](const auto& options) { return options.term == DampingOptions::Term::contact; });
-}
-
 template <int Dim>
 bool is_periodic(const Setup<Dim>& setup) {
   return std::ranges::any_of(setup.ties, [](const Tie& tie) { return static_cast<bool>(tie.jump); });
@@ -63,18 +45,44 @@ struct Check {
   bool (*applies)(const Setup<Dim>&, bool);
 };
 
+constexpr const char* kAverages = "/contact/average_gaps";
+
+/// Reasons for which gaps are not averaged.
+template <int Dim>
+constexpr Check<Dim> kAverageChecks[] = {
+    {{kAverages, "averaged gaps in 3D"}, [](const Setup<Dim>&, bool) { return Dim == 3; }},
+    {{kAverages, "averaged gaps around an axis"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric(); }},
+    {{kAverages, "averaged gaps where the mesh changes"},
+     [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled; }},
+    {{kAverages, "averaged gaps of quadratic elements"}, [](const Setup<Dim>&, bool curves) { return curves; }},
+    {{kAverages, "averaged gaps with obstacles; bodies whose motion is prescribed serve"},
+     [](const Setup<Dim>& setup, bool) { return !setup.obstacles.rest.empty(); }},
+    {{kAverages, "averaged gaps with a collision mesh"},
+     [](const Setup<Dim>& setup, bool) { return setup.proxy && !setup.proxy->retraction; }},
+    {{kAverages, "averaged gaps with friction by pair"},
+     [](const Setup<Dim>& setup, bool) { return !setup.contact.friction_pairs.empty(); }},
+    {{kAverages, "averaged gaps with overlaps to resolve"},
+     [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap; }},
+    {{kAverages, "averaged gaps with ties"}, [](const Setup<Dim>& setup, bool) { return !setup.ties.empty(); }},
+    {{kAverages, "averaged gaps with adhesion"}, [](const Setup<Dim>& setup, bool) { return setup.contact.has_adhesion(); }},
+    {{kAverages, "averaged gaps with damping of contact"},
+     [](const Setup<Dim>& setup, bool) {
+       return std::ranges::any_of(
+           setup.damping, [](const DampingOptions& options) { return options.term == DampingOptions::Term::contact; });
+     }},
+    {{kAverages, "averaged gaps with rigid bodies"},
+     [](const Setup<Dim>& setup, bool) { return has_rigid_bodies(setup.materials); }},
+    {{kAverages, "averaged gaps with fluids that penetrate"},
+     [](const Setup<Dim>& setup, bool) { return !setup.fluids.empty(); }},
+    {{kAverages, "averaged gaps with the plain form of contact"},
+     [](const Setup<Dim>& setup, bool) { return !setup.contact.convergent; }},
+};
+
 template <int Dim>
 constexpr Check<Dim> kChecks[] = {
     {{"/contact/collision_mesh", "a collision mesh where the bodies' mesh changes"},
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.proxy; }},
-    {{"/contact/average_gaps", "averaged gaps in 3D, around an axis, of quadratic elements, or where the mesh changes"},
-     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && !has_lasting_lines(setup); }},
-    {{"/contact/average_gaps", "averaged gaps with obstacles, rigid bodies, a collision mesh, ties, or overlaps to resolve"},
-     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && has_other_surfaces(setup); }},
-    {{"/contact/average_gaps",
-      "averaged gaps with friction by pair, adhesion, damping of contact, fluids that penetrate, or the plain form of "
-      "contact"},
-     [](const Setup<Dim>& setup, bool) { return setup.contact.average_gaps && has_other_contact(setup); }},
     {{"/contact/initial_overlap", "\"resolve\" with a collision mesh, whose surface has no inside"},
      [](const Setup<Dim>& setup, bool) { return setup.contact.resolve_overlap && setup.proxy; }},
     {{"/contact/initial_overlap", "\"resolve\" with adhesion, which pulls on what is at rest"},
@@ -180,22 +188,28 @@ constexpr Check<Dim> kChecks[] = {
 
 template <int Dim>
 void refuse(const Setup<Dim>& setup, bool curves) {
-  for (const auto& [combination, applies] : kChecks<Dim>)
-    if (applies(setup, curves))
-      throw InputError({"", combination.place, combination.words, "something that this version supports"});
+  const auto refuse_any = [&](std::span<const Check<Dim>> checks) {
+    for (const auto& [combination, applies] : checks)
+      if (applies(setup, curves))
+        throw InputError({"", combination.place, combination.words, "something that this version supports"});
+  };
+  if (setup.contact.average_gaps) refuse_any(kAverageChecks<Dim>);
+  refuse_any(kChecks<Dim>);
 }
 
 }  // namespace
 
 std::vector<UnsupportedCombination> unsupported_combinations() {
   std::vector<UnsupportedCombination> combinations;
+  for (const auto& check : kAverageChecks<2>) combinations.push_back(check.combination);
   for (const auto& check : kChecks<2>) combinations.push_back(check.combination);
   return combinations;
 }
 
 template <int Dim>
 bool can_average_gaps(const Setup<Dim>& setup) {
-  return has_lasting_lines(setup) && !has_other_surfaces(setup) && !has_other_contact(setup);
+  return std::ranges::none_of(kAverageChecks<Dim>,
+                              [&](const Check<Dim>& check) { return check.applies(setup, may_curve(setup)); });
 }
 
 template <int Dim>

@@ -200,6 +200,7 @@ void find_odd_stiffness(const Setup<Dim>& setup, const MeshFigures<Dim>& figures
   if (!contact.enabled || contact.adaptive_stiffness || !(contact.barrier_stiffness > 0)) return;
   const auto [softest, stiffest] = range_of_moduli(setup, figures);
   const double low = barrier_stiffness_for(setup, contact, softest), high = barrier_stiffness_for(setup, contact, stiffest);
+  if (!(high > 0)) return;  // of rigid bodies alone
   if (contact.barrier_stiffness >= low / kStiffnessRange && contact.barrier_stiffness <= kStiffnessRange * high) return;
   const bool is_stiff = contact.barrier_stiffness > high;
   const double unit = barrier_unit(setup.units, contact);
