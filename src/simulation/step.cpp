@@ -457,9 +457,8 @@ class StepSolver {
     if (again) {
       settle_chords();
       make_problem();
-      const double shape_energy = problem_->report(x_).total - problem.report(solution).total;
+      effort.shape_energy = problem_->report(x_).total - problem.report(solution).total;
       renumbering = renumbering ? compose(*renumbering, *again) : *again;
-      tools_.logger.info(fmt::format("step {}: shape_energy {}", next_.step, shape_energy));
     }
     report_.add_effort(effort);
   }
