@@ -129,7 +129,7 @@ struct Ball {
     AddedMaterial<Dim> added;
     state.strata = {};
     const auto report = put_on_shapes<Dim>(shapes, mesh, fields, context, remesh_options(), memory, state.strata, added);
-    EXPECT_EQ(report.smooths.accepted, static_cast<int>(edges.size()));
+    EXPECT_GE(report.smooths.accepted, static_cast<int>(edges.size()));
     const auto renumbering = mesh.compact();
     settle(fields, renumbering);
     state.strata.compact(renumbering);
@@ -179,10 +179,10 @@ TYPED_TEST_SUITE(Shapes_, Dimensions);
 
 TYPED_TEST(Shapes_, VerticesGetOntoThemAndMomentaAndOrientationStay) {
   constexpr int Dim = TypeParam::value;
-  for (unsigned seed = 0; seed < 10; ++seed) {
+  for (unsigned seed = 0; seed < (Dim == 2 ? 10 : 3); ++seed) {
     Ball<Dim> ball(seed, seed % 2 == 1);
     double missing = 1;
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < (Dim == 2 ? 3 : 2); ++round) {
       const auto added = ball.refine();
       for (const VertexId v : ball.state.mesh.live_vertices())
         EXPECT_NEAR(ball.state.mesh.is_boundary(v) ? ball.state.mesh.rest(v).norm() : 1, 1, kRoundOff);
@@ -193,7 +193,7 @@ TYPED_TEST(Shapes_, VerticesGetOntoThemAndMomentaAndOrientationStay) {
       EXPECT_LT(now, 0.5 * missing);
       missing = now;
     }
-    EXPECT_LT(missing, Dim == 2 ? 1e-3 : 0.1);
+    EXPECT_LT(missing, Dim == 2 ? 1e-4 : 0.01);
   }
 }
 

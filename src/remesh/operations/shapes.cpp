@@ -126,14 +126,16 @@ class ShapeOperation {
     for (const VertexId v : mesh_.live_vertices())
       if (mesh_.is_boundary(v)) vertices.push_back(v);
     for (const VertexId v : vertices) put_on_shape(v);
-    if (!queries_.has_contact()) return;
     std::vector<EdgeKey> edges = surface_edges();
     for (int round = 0; round < kMostRounds && !edges.empty(); ++round) edges = split(edges);
   }
 
  private:
   static constexpr double kTolerance = 1e-14;  ///< how far off its shape a vertex counts as on it, by the mesh's diagonal
-  static constexpr double kWorthMoving = 10;   ///< tolerances from which on it is moved
+  /// Angle by which a shape turns along an edge, wherever it is: material of a body that turns, or is about to touch, is
+  /// there before.
+  static constexpr double kMostTurn = 2 * std::numbers::pi / (Dim == 2 ? 96 : 32);
+  static constexpr double kWorthMoving = 10;  ///< tolerances from which on it is moved
 
   bool is_kept(FacetId f) const {
     const auto& kept = queries_.context().kept_surfaces;
@@ -267,12 +269,16 @@ class ShapeOperation {
     return edges;
   }
 
-  /// How far the middle of an edge of a surface is off its shape [m]; 0 where that may stay.
-  double sag_to_mend(const EdgeKey& edge) const {
+  /// How far the middle of an edge of a surface is off its shape [m]; 0 where that may stay: the edge is short beside the
+  /// radius of the shape, and contact sees nothing of it.
+  double sag_to_mend(const EdgeKey& edge) {
     const Carriers<Dim> carriers(mesh_, shapes_, edge);
     if (!carriers.has_shape()) return 0;
     const double sag = carriers.distance((mesh_.rest(edge[0]) + mesh_.rest(edge[1])) / 2);
-    if (sag <= carriers.most_sag(kMostOverhang * queries_.context().contact.dhat)) return 0;
+    const bool is_coarse = sag > kMostTurn / 8 * (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).norm();
+    if (!is_coarse && !(queries_.has_contact() && sag > carriers.most_sag(kMostOverhang * queries_.context().contact.dhat) &&
+                        may_touch(edge, sag)))
+      return 0;
     const auto both = [&](auto&& holds) { return holds(edge[0]) && holds(edge[1]); };
     const bool stays = both([&](VertexId v) { return mesh_.is_on_axis(v); }) ||
                        both([&](VertexId v) { return mesh_.is_on_interface(v); }) ||
@@ -280,11 +286,11 @@ class ShapeOperation {
     return stays ? 0 : sag;
   }
 
-  /// Splits those edges that contact would see to be straight, those farthest off first, and returns the new ones.
+  /// Splits the edges that are too far off their shapes, those farthest off first, and returns the new ones.
   std::vector<EdgeKey> split(const std::vector<EdgeKey>& edges) {
     std::vector<std::pair<double, EdgeKey>> wanted;
     for (const EdgeKey& edge : edges)
-      if (const double sag = sag_to_mend(edge); sag > 0 && may_touch(edge, sag)) wanted.emplace_back(-sag, edge);
+      if (const double sag = sag_to_mend(edge); sag > 0) wanted.emplace_back(-sag, edge);
     std::ranges::sort(wanted);
     std::vector<EdgeKey> made;
     for (const auto& [height, edge] : wanted) {
