@@ -130,6 +130,8 @@ struct ITR_EXPORT StepReport {
   int indefinite = 0;         ///< factorised Hessians with negative eigenvalues, where the solver tells
   EnergyReport energy;
   double energy_before_remesh = 0;  ///< total after the first solve [J]
+  /// Jump of the total where surfaces were put onto their shapes: material comes or goes there, which is no gain [J].
+  double shape_energy = 0;
   /// Energy that the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]:
   /// not gained by remeshing, though the total is lower by it. Of viscoelastic bodies, too, what their state lost where it
   /// was averaged over new cells. Over all parts of a step that was cut.

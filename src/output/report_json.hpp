@@ -34,7 +34,7 @@ class Totals {
 
  private:
   StepReport total_;
-  double gain_ = 0;  ///< by remeshing: sum of energy_before_remesh - total - history_loss [J]
+  double gain_ = 0;  ///< by remeshing: sum of energy_before_remesh + shape_energy - total - history_loss [J]
 };
 
 /// Returns what Totals::save gives from the list of numbers of checkpoints of formats 7 and 8. Throws InputError for a

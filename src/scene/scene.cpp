@@ -14,6 +14,7 @@
 #include "readers.hpp"
 #include "rigid.hpp"
 #include "selection_file.hpp"
+#include "shapes.hpp"
 #include "supports.hpp"
 #include "transformation.hpp"
 
@@ -107,6 +108,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   read_preset_problem<Dim>(root, sets.bodies, setup);
   setup.ties = read_ties<Dim>(root, sets, setup.mesh, setup.time);
   read_supports<Dim>(root, sets, setup);
+  read_shapes<Dim>(root, sets, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 

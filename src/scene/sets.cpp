@@ -54,6 +54,7 @@ References collect_references(const Node& root) {
     add_labels(entry["id"], references.surfaces);
   for (const char* list : {"springs", "couplings"})
     for (const Node& entry : root[list].items()) add_labels(entry["id"], references.surfaces);
+  for (const Node& entry : root["shapes"].items()) add_labels(entry["surface"], references.surfaces);
   for (const Node& entry : root["ties"].items())
     for (const char* side : {"a", "b"}) add_labels(entry[side], references.surfaces);
   for (const Node& entry : root["output"]["forces"].items()) {

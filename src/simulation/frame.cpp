@@ -67,6 +67,7 @@ void add_up(StepReport& report, const StepReport& before) {
 void StepReport::forget_operations() {
   for (auto* operations : {&splits, &curves, &straightens, &collapses, &swaps, &smooths}) operations->accepted = 0;
   history_loss = 0;
+  shape_energy = 0;
   remeshing.clear();
 }
 

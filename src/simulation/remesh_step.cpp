@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <set>
 #include <utility>
@@ -12,12 +13,14 @@
 #include "core/timer.hpp"
 #include "energy/cavity.hpp"
 #include "energy/inertia.hpp"
+#include "energy/shape_entry.hpp"
 #include "geometry/bvh.hpp"
 #include "itr/energy.hpp"
 #include "itr/transfer.hpp"
 #include "remesh/remesher.hpp"
 #include "simulation/history_transfer.hpp"
 #include "simulation/moment.hpp"
+#include "simulation/shape_step.hpp"
 #include "simulation/state.hpp"
 #include "time/integrator.hpp"
 
@@ -261,11 +264,13 @@ std::vector<CellId> removed_cells(const Mesh<Dim>& before, const Mesh<Dim>& now)
   return removed;
 }
 
-/// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over.
+/// `operate(mesh, fields, context, options, memory, strata)` on the state's mesh, and carries the state over: interpolants
+/// of the history are there when `settle(renumbering)` is called, or are projected where there is none.
 template <int Dim, typename Operate>
 std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                   const State<Dim>& before, State<Dim>& state, VectorX& x,
-                                                  StepReport& report, const Operate& operate) {
+                                                  StepReport& report, const Operate& operate,
+                                                  const std::function<void(const MeshRenumbering&)>& settle = {}) {
   const StepSetup<Dim>& setup = tools.setup;
   const StepContext<Dim> context = make_context(tools, before, problem, x, report.energy);
   RemeshFields<Dim> fields = make_fields<Dim>(setup, context, before, x);
@@ -306,7 +311,9 @@ std::optional<MeshRenumbering> change_and_project(const StepTools<Dim>& tools, c
   std::size_t next = 0;
   for (auto& v : state.history.v) v = carried(fields.past_rates[next++], VectorX(v));
   for (auto& a : state.history.a) a = carried(fields.past_rates[next++], VectorX(a));
-  if (remeshed.coarsened()) {  // else interpolation is exact
+  if (settle) {
+    settle(renumbering);
+  } else if (remeshed.coarsened()) {  // else interpolation is exact
     const auto transfer = transfer_history(setup, before.mesh, before.history, state.mesh, touched,
                                            tools.cache.system.solver(), state.history);
     report.history_loss = transfer.loss / problem.scaling();
@@ -338,6 +345,20 @@ std::optional<MeshRenumbering> curve_and_project(const StepTools<Dim>& tools, co
 }
 
 template <int Dim>
+std::optional<MeshRenumbering> shape_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
+                                                 const State<Dim>& before, State<Dim>& state, VectorX& x,
+                                                 StepReport& report) {
+  const Shapes shapes = shapes_of<Dim>(tools.setup.nodal_loads);
+  AddedMaterial<Dim> added;
+  return change_and_project(
+      tools, problem, before, state, x, report, [&](auto&&... all) { return put_on_shapes<Dim>(shapes, all..., added); },
+      [&](const MeshRenumbering& renumbering) {
+        for (VertexId& v : added.moved) v = renumbering.vertex[v];
+        if (tools.setup.time.has_inertia()) keep_momenta(tools.setup, before, added, state);
+      });
+}
+
+template <int Dim>
 std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tools, std::span<const CellId> cells,
                                                       double least_volume, const State<Dim>& before, State<Dim>& state,
                                                       VectorX& x, StepReport& report) {
@@ -353,6 +374,8 @@ std::optional<MeshRenumbering> straighten_and_project(const StepTools<Dim>& tool
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                               \
+  template std::optional<MeshRenumbering> shape_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,           \
+                                                                 const State<Dim>&, State<Dim>&, VectorX&, StepReport&);   \
   template std::optional<MeshRenumbering> remesh_and_project<Dim>(                                                         \
       const StepTools<Dim>&, const StepProblem<Dim>&, const State<Dim>&, State<Dim>&, VectorX&, StepReport&, bool);        \
   template std::optional<MeshRenumbering> curve_and_project<Dim>(const StepTools<Dim>&, const StepProblem<Dim>&,           \

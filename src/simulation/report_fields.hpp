@@ -76,6 +76,7 @@ inline constexpr std::tuple kStepFields{
     ReportField{"linear_iterations", &StepReport::linear_iterations, AddUp::sum, "", in_files},
     ReportField{"energy", &StepReport::energy, AddUp::last, "J", everywhere},
     ReportField{"energy_before_remesh", &StepReport::energy_before_remesh, AddUp::last, "J", in_files},
+    ReportField{"shape_energy", &StepReport::shape_energy, AddUp::sum, "J", in_files | if_any},
     ReportField{"splits", &StepReport::splits, AddUp::sum, "", everywhere},
     ReportField{"curves", &StepReport::curves, AddUp::sum, "", everywhere},
     ReportField{"straightens", &StepReport::straightens, AddUp::sum, "", everywhere},

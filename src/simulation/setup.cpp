@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +14,7 @@
 
 #include "energy/cavity.hpp"
 #include "energy/mortar.hpp"
+#include "energy/shape_entry.hpp"
 #include "fem/locator.hpp"
 #include "itr/core.hpp"
 #include "mesh/facet_tags.hpp"
@@ -384,6 +386,32 @@ void check_rigid(const Setup<Dim>& setup) {
                "what stays of its motion in /geometry/*/rigid/held, or an obstacle in its place");
 }
 
+/// Vertices that the mesh begins with are moved onto their shape, but not far: as far as one is that refines a polygon.
+template <int Dim>
+void check_shapes(const Setup<Dim>& setup) {
+  constexpr double kFar = 0.05;  // of the surface's diagonal
+  const Mesh<Dim>& mesh = setup.mesh;
+  const auto shapes = shapes_of<Dim>(setup.nodal_loads);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const Shape& shape = *shapes[i];
+    if (shape.kind == Shape::Kind::fitted) continue;
+    Eigen::AlignedBox<double, Dim> box;
+    double farthest = 0;
+    for (const FacetId f : mesh.live_facets()) {
+      if (std::ranges::find(shape.surfaces, mesh.facet_tag(f)) == shape.surfaces.end()) continue;
+      for (const VertexId v : mesh.facet(f)) {
+        Vec<3> point = Vec<3>::Zero();
+        point.head<Dim>() = mesh.rest(v);
+        farthest = std::max(farthest, std::abs(offset_from(shape, point).distance));
+        box.extend(mesh.rest(v));
+      }
+    }
+    if (farthest > kFar * box.diagonal().norm())
+      refuse(fmt::format("/shapes/{}", i), fmt::format("a geometry that a vertex of its surface is {:g} m off", farthest),
+             "one that all vertices of the surface lie on");
+  }
+}
+
 template <int Dim>
 void check_proxy(const Setup<Dim>& setup) {
   if (!setup.proxy) return;
@@ -432,6 +460,7 @@ void Setup<Dim>::validate() const {
   refuse_idle_fluids(*this, mesh);
   check_ties(*this);
   check_rigid(*this);
+  check_shapes(*this);
   check_supports(*this);
   check_points(*this);
   for (std::size_t i = 0; i < this->fields.curves.size(); ++i)

@@ -16,6 +16,7 @@
 #include "core/check.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "energy/shape_entry.hpp"
 #include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
@@ -25,6 +26,7 @@
 #include "simulation/fluid_front.hpp"
 #include "simulation/invariants.hpp"
 #include "simulation/remesh_step.hpp"
+#include "simulation/shape_step.hpp"
 #include "simulation/stability.hpp"
 #include "simulation/step_terms.hpp"
 #include "simulation/straightening.hpp"
@@ -424,6 +426,7 @@ class StepSolver {
     else
       renumbering = remesh_and_project(tools_, *first_->problem, first_->state, next_, x_, report_,
                                        remeshing == Remeshing::with_new_curves);
+    if (remeshing != Remeshing::none && !shapes_of<Dim>(setup_.nodal_loads).empty()) take_shapes(renumbering);
     if (!renumbering) {
       problem_ = std::move(first_->problem);
       return std::nullopt;
@@ -438,6 +441,26 @@ class StepSolver {
                        .reason = std::move(reason),
                        .nearly_inverted = {},
                        .has_new_curves = report_.curves.accepted > 0};
+  }
+
+  /// Puts surfaces onto their shapes around x, and adds to what became of ids. The energy of x jumps as material comes or
+  /// goes; what is lagged acts on neither side.
+  void take_shapes(std::optional<MeshRenumbering>& renumbering) {
+    if (renumbering) settle_chords();
+    const State<Dim> unchanged = next_;
+    const VectorX solution = x_;
+    StepProblem<Dim> problem(setup_, unchanged.mesh, unchanged.history, unchanged.t, tools_.cache, unchanged.stiffness,
+                             unchanged.quadrature, unchanged.chords);
+    StepReport effort;
+    effort.energy = report_.energy;
+    const auto again = shape_and_project(tools_, problem, unchanged, next_, x_, effort);
+    if (again) {
+      settle_chords();
+      make_problem();
+      effort.shape_energy = problem_->report(x_).total - problem.report(solution).total;
+      renumbering = renumbering ? compose(*renumbering, *again) : *again;
+    }
+    report_.add_effort(effort);
   }
 
   /// Whether edges become curved where straight ones keep up what would buckle.

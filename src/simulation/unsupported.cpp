@@ -6,7 +6,7 @@
 
 #include "energy/elastic/law_table.hpp"
 #include "energy/rigid_body.hpp"
-#include "energy/support.hpp"
+#include "energy/shape_entry.hpp"
 #include "itr/core.hpp"
 
 namespace itr {
@@ -178,6 +178,11 @@ constexpr Check<Dim> kChecks[] = {
     {{"/initial_conditions/acceleration", "\"consistent\" where there are rigid bodies"},
      [](const Setup<Dim>& setup, bool) {
        return setup.consistent_initial_acceleration && has_rigid_bodies(setup.materials);
+     }},
+    {{"/shapes", "shapes where bodies are viscoelastic: their state has none for new material"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && !shapes_of<Dim>(setup.nodal_loads).empty() &&
+              std::ranges::any_of(setup.materials, [](const auto& e) { return !e.second.prony.empty(); });
      }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {

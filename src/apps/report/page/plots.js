@@ -110,7 +110,7 @@ function plotsOf(run) {
 const titleCase = text => text[0].toUpperCase() + text.slice(1);
 
 function gainOf(step) {
-  return step.step > 0 ? step.energy_before_remesh - step.energy.total - step.history_loss : 0;
+  return step.step > 0 ? step.energy_before_remesh + (step.shape_energy ?? 0) - step.energy.total - step.history_loss : 0;
 }
 
 class Plot {
