@@ -67,6 +67,22 @@ TEST(Statics, DampingCreepsAsKelvinAndVoigtSay) {
   }
 }
 
+TEST(Statics, QuasistaticStepsBeginWhereTheMotionGoesOn) {
+  auto setup = symmetric_square(3);
+  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 0;
+  setup.materials[1].law = MaterialLaw::linear;
+  setup.dirichlet.push_back({3, {true, false}, [](const Vec<2>&, double t) { return Vec<2>(std::min(t, 0.08 - t), 0); }});
+  setup.time = {.quasistatic = true, .dt = 0.01, .steps = 6};
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  // A linear body follows its prescribed motion until that turns back.
+  for (const bool is_new : {true, false, false, false, true, false}) {
+    const auto result = simulation.advance();
+    ASSERT_TRUE(result.ok) << result.reason;
+    EXPECT_EQ(result.report.newton_iterations > 0, is_new) << "t " << simulation.state().t;
+  }
+}
+
 TEST(Statics, ContactCarriesTheLoad) {
   auto setup = symmetric_square(4);
   setup.time = {.is_static = true};
