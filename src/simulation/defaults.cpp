@@ -377,7 +377,11 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
     std::string chosen = choose_friction_velocity(*this, contact);
     if (contact.has_friction()) words.push_back(std::move(chosen));
   }
-  if (!remesh.enabled) return words;
+  if (!remesh.enabled) {
+    if (!shapes_of<Dim>(this->nodal_loads).empty())
+      words.emplace_back("surfaces keep their facets: /shapes acts where meshes change, /space/remesh/enabled");
+    return words;
+  }
   fit_shapes(mesh, this->nodal_loads);
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
   if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));

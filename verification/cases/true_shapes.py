@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Bodies that begin as coarse polyhedra and are remeshed with the true shape of their surface, `/shapes`, by defaults otherwise."""
+"""Bodies that begin as coarse polyhedra and are remeshed with the true shape of their surface, `/shapes`, by defaults otherwise; the half
+sphere with the accuracy that is asked of it, too."""
 import csv
 import json
 import math
@@ -61,7 +62,7 @@ def wheel(context, steps=300, dt=0.001, corners=12, gap=5e-5):
     return (frames[3][0] - frames[1][0]) / (2 * (steps // 3) * dt), frames[3][1]
 
 
-def half_sphere(context, h=1.0, dt=0.1, gap=1e-4):
+def half_sphere(context, accuracy=None, h=1.0, dt=0.1, gap=1e-4):
     """The section of a half sphere, bonded to a plate that presses it onto a smooth rigid plane: force, and vertices."""
     away = lambda x: np.linalg.norm(x + [0, HALF], axis=1)
     points, cells = ball(HALF, lambda x: np.minimum(3 * h + 1, np.maximum(h, 0.6 * (away(x) - 2))), ((1, -1),))
@@ -72,7 +73,7 @@ def half_sphere(context, h=1.0, dt=0.1, gap=1e-4):
         "geometry": [{"mesh": "half.msh", "surface_selection": [
             {"id": 1, "box": [[-1, top - 1e-6], [far, far]]}, {"id": 2, "box": [[-1e-9, -1], [1e-9, far]]},
             {"id": 3, "box": [[1e-6, -1], [far, top - 1e-6]]}]}, {"mesh": "plane.obj", "is_obstacle": True}],
-        "axisymmetric": True,
+        "axisymmetric": True, **({"accuracy": accuracy} if accuracy else {}),
         "shapes": [{"surface": 3, "type": "circle", "center": [0, top], "radius": HALF}],
         "materials": {"type": "NeoHookean", "E": 10, "nu": 0.3, "rho": 1e-9},
         "boundary_conditions": {"dirichlet_boundary": [
@@ -89,5 +90,9 @@ def results(context):
     yield compare("wheel [m/s^2]", acceleration, 2 / 3 * 9.81 * math.sin(SLOPE), 3e-3)
     disc = math.pi * WHEEL**2
     yield Result("area of the wheel", 1 - area / disc, None, area, disc, "0.045 with 12 corners")
+    if context.quick:
+        return
     force, vertices = half_sphere(context)
-    yield compare("half sphere [N]", force, FORCE, 5e-3, f"{vertices} vertices")
+    yield compare("half sphere, default tolerance [N]", force, FORCE, None, f"{vertices} vertices")
+    force, vertices = half_sphere(context, accuracy=0.005)
+    yield compare("half sphere, accuracy 0.005 [N]", force, FORCE, 5e-3, f"{vertices} vertices")
