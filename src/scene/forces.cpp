@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <set>
 
-#include "fem/locator.hpp"
 #include "mesh/facet_tags.hpp"
 #include "readers.hpp"
 
@@ -155,43 +151,19 @@ std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, c
   return targets;
 }
 
-namespace {
-
-/// Refuses a point that is farther from the bodies than chords of a round are: half an edge of the nearest cell.
 template <int Dim>
-void check_inside(const Node& node, const Mesh<Dim>& mesh, const Locator<Dim>& locator, const Vec<Dim>& X) {
-  const auto place = locator.find(X);
-  Vec<Dim> nearest = Vec<Dim>::Zero();
-  double longest = 0;
-  for (int k = 0; k <= Dim; ++k) {
-    nearest += place.weights[k] * mesh.rest(place.nodes[k]);
-    for (int l = 0; l < k; ++l) longest = std::max(longest, (mesh.rest(place.nodes[k]) - mesh.rest(place.nodes[l])).norm());
-  }
-  if ((X - nearest).norm() <= longest / 2) return;
-  const double unit = node.document().units.factor("m");
-  const Vec<Dim> in_units = nearest / unit;
-  node.fail(fmt::format("{}, {:.3g} away from all bodies", abbreviate(node.json()), (X - nearest).norm() / unit),
-            fmt::format("a point of a body at rest; the nearest one is [{:.6g}]", fmt::join(in_units, ", ")));
-}
-
-}  // namespace
-
-template <int Dim>
-std::vector<PointTarget> read_points(const Node& root, const Mesh<Dim>& mesh) {
+std::vector<PointTarget> read_points(const Node& root) {
   std::vector<PointTarget> targets;
-  if (root["output"]["points"].items().empty()) return targets;
-  const Locator<Dim> locator(mesh);
   std::set<std::string> names;
   for (const Node& node : root["output"]["points"].items()) {
     targets.push_back({read_name(node, "the name of the point"), read_place<Dim>(node["rest"])});
-    check_inside<Dim>(node["rest"], mesh, locator, Vec<Dim>(targets.back().rest.data()));
     if (!names.insert(targets.back().name).second) node["name"].fail("a name that no entry before it has");
   }
   return targets;
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                   \
-  template std::vector<PointTarget> read_points(const Node&, const Mesh<Dim>&);                \
+  template std::vector<PointTarget> read_points<Dim>(const Node&);                             \
   template PartNames name_parts(const Geometries&, const ObstacleGeometry<Dim>&, const Sets&); \
   template std::vector<ForceTarget> read_forces(const Node&, const PartNames&, const Sets&, const Mesh<Dim>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)

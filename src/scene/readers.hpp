@@ -111,7 +111,7 @@ PartNames name_parts(const Geometries& geometries, const ObstacleGeometry<Dim>& 
 template <int Dim>
 std::vector<ForceTarget> read_forces(const Node& root, const PartNames& parts, const Sets& sets, const Mesh<Dim>& mesh);
 template <int Dim>
-std::vector<PointTarget> read_points(const Node& root, const Mesh<Dim>& mesh);
+std::vector<PointTarget> read_points(const Node& root);
 
 /// Vertices of the obstacles of this name or this `surface_selection`, ascending.
 std::vector<int> obstacle_vertices(const PartNames& parts, const Sets& sets, const Label& label);

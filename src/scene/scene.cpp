@@ -151,7 +151,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
   add_named_curves(root, setup, curves);
   setup.fields.curves = std::move(curves);
-  setup.fields.points = read_points<Dim>(root, setup.mesh);
+  setup.fields.points = read_points<Dim>(root);
   setup.fields.error_bars = root["output"]["error_bars"].boolean(false);
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);

@@ -308,13 +308,37 @@ void check_nodes_of_couplings(const Setup<Dim>& setup) {
   }
 }
 
+/// Refuses a point that is farther from the bodies than chords of a round are: half an edge of the nearest cell.
+template <int Dim>
+void check_near(const Setup<Dim>& setup, const Locator<Dim>& locator, const Vec<Dim>& X, std::size_t i) {
+  const auto place = locator.find(X);
+  Vec<Dim> nearest = Vec<Dim>::Zero();
+  double longest = 0;
+  const auto rest = [&](int k) { return setup.mesh.rest(place.nodes[k]); };
+  for (int k = 0; k <= Dim; ++k) {
+    nearest += place.weights[k] * rest(k);
+    for (int l = 0; l < k; ++l) longest = std::max(longest, (rest(k) - rest(l)).norm());
+  }
+  if ((X - nearest).norm() <= longest / 2) return;
+  const auto text = [&](const Vec<Dim>& at) {
+    return fmt::format("{} {}", point_text<Dim>(at, setup.units, 6), setup.units.length());
+  };
+  throw InputError({"", fmt::format("/output/points/{}/rest", i),
+                    fmt::format("{}, {} away from all bodies", text(X), setup.units.text((X - nearest).norm(), "m", 3)),
+                    "a point of a body at rest; the nearest one is " + text(nearest)});
+}
+
 /// Refuses points at places that two connected parts share, of which either may move away, unless ties hold them together.
 template <int Dim>
 void check_points(const Setup<Dim>& setup) {
   constexpr double kRoundOff = 1e-9;
+  if (setup.fields.points.empty()) return;
   const Mesh<Dim>& mesh = setup.mesh;
-  for (std::size_t i = 0; i < setup.fields.points.size() && setup.ties.empty(); ++i) {
+  const Locator<Dim> locator(mesh);
+  for (std::size_t i = 0; i < setup.fields.points.size(); ++i) {
     const Vec<Dim> X(setup.fields.points[i].rest.data());
+    check_near(setup, locator, X, i);
+    if (!setup.ties.empty()) continue;
     CellId first = kNone;
     for (const CellId c : mesh.live_cells()) {
       const auto weights = barycentric_weights<Dim>(mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c), X);
