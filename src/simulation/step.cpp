@@ -384,10 +384,12 @@ class StepSolver {
         setup_.units.text(depth, "m", 3)));
   }
 
-  /// Where forces that act as in the last step lead to; without inertia, where its motion goes on. Empty in statics.
+  /// Where forces that act as in the last step lead to; without inertia, where its motion goes on, unless the mesh changes
+  /// between steps and the motion with it. Empty in statics.
   VectorX expected() const {
     if (setup_.time.is_static) return {};
-    if (!setup_.time.has_inertia()) return x_ + setup_.time.dt * next_.history.v[0];
+    if (!setup_.time.has_inertia())
+      return setup_.remesh.enabled ? VectorX() : VectorX(x_ + setup_.time.dt * next_.history.v[0]);
     VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
     if (setup_.time.adaptive.enabled && !next_.history.a.empty())
       x += TimeIntegrator(setup_.time).scaling(next_.history) * next_.history.a[0];  // steps may differ in length
