@@ -135,7 +135,8 @@ void Totals::add(const StepReport& report) {
   const StepReport before = total_;
   total_ = report;
   if (before.vertices > 0) add_up(total_, before);
-  if (report.step > 0) gain_ += report.energy_before_remesh + report.shape_energy - report.energy.total - report.history_loss;
+  if (report.step > 0)
+    gain_ += report.energy_before_remesh + report.shape_energy - report.energy.total - report.history_loss;
 }
 
 namespace {

@@ -192,7 +192,7 @@ class StepSolver {
       settle_chords();
     else
       x_ = next_.history.x[0];
-    first_summary_ = solve_with_fluids(expected());
+    first_summary_ = solve_with_fluids(expected_positions(setup_, next_, x_));
     must_settle_ = false;  // a cut would not help what remeshing does
     if (!first_summary_.converged()) {
       // Infeasible: det F > 0 where the barrier in curved cells cannot prove it.
@@ -384,20 +384,6 @@ class StepSolver {
         setup_.units.text(depth, "m", 3)));
   }
 
-  /// Where forces that act as in the last step lead to; without inertia, where its motion goes on, unless the mesh changes
-  /// between steps and the motion with it. Empty in statics.
-  VectorX expected() const {
-    if (setup_.time.is_static) return {};
-    if (!setup_.time.has_inertia())
-      return setup_.remesh.enabled ? VectorX() : VectorX(x_ + setup_.time.dt * next_.history.v[0]);
-    VectorX x = TimeIntegrator(setup_.time).predictor(next_.history);
-    if (setup_.time.adaptive.enabled && !next_.history.a.empty())
-      x += TimeIntegrator(setup_.time).scaling(next_.history) * next_.history.a[0];  // steps may differ in length
-    else if (next_.deviation.size() == x.size())
-      x += next_.deviation;
-    return x;
-  }
-
   /// From x, where what is lagged is lagged first.
   NewtonSummary solve(const VectorX& expected = {}) {
     NewtonSummary summary = problem_->solve(x_, VectorX(x_), expected, must_settle_);
@@ -552,12 +538,6 @@ void tell(const Attempt& next, const StepFailure& failure, int step, const Logge
 }
 
 }  // namespace
-
-void add_dropped(StepReport dropped, StepReport& report) {
-  dropped.forget_operations();
-  dropped.damped_steps = 0;
-  report.add_effort(dropped);
-}
 
 template <int Dim>
 StepResult take_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,

@@ -6,6 +6,7 @@
 
 #include "fem/locator.hpp"
 #include "simulation/step.hpp"
+#include "time/integrator.hpp"
 
 namespace itr {
 
@@ -132,6 +133,27 @@ StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& befo
   return result;
 }
 
+template <int Dim>
+VectorX expected_positions(const StepSetup<Dim>& setup, const State<Dim>& before, const VectorX& x) {
+  const TimeOptions& time = setup.time;
+  if (time.is_static) return {};
+  if (!time.has_inertia()) return setup.remesh.enabled ? VectorX() : VectorX(x + time.dt * before.history.v[0]);
+  VectorX expected = TimeIntegrator(time).predictor(before.history);
+  if (time.adaptive.enabled && !before.history.a.empty())
+    expected += TimeIntegrator(time).scaling(before.history) * before.history.a[0];  // steps may differ in length
+  else if (before.deviation.size() == expected.size())
+    expected += before.deviation;
+  return expected;
+}
+
+void add_dropped(StepReport dropped, StepReport& report) {
+  dropped.forget_operations();
+  dropped.damped_steps = 0;
+  report.add_effort(dropped);
+}
+
+template VectorX expected_positions(const StepSetup<2>&, const State<2>&, const VectorX&);
+template VectorX expected_positions(const StepSetup<3>&, const State<3>&, const VectorX&);
 template StepResult take_shorter_step<2>(const StepTools<2>&, const State<2>&, State<2>&, State<2>*, const Attempt&,
                                          StepResult);
 template StepResult take_shorter_step<3>(const StepTools<3>&, const State<3>&, State<3>&, State<3>*, const Attempt&,
