@@ -30,7 +30,10 @@ class Convergence {
       unresolved_ = creeping_ = 0;
       return {};
     }
-    if (step.is_of_shift) return {};
+    if (step.is_of_shift) {
+      creeping_ = 0;
+      return {};
+    }
     if (has_small_step(step)) return Termination::step;
     if (at_.decrement_of(step) < task_.options.decrement_tolerance) return Termination::decrement;
     if (has_ceased_to_improve(step) || creeps(step)) return Termination::round_off;

@@ -89,8 +89,9 @@ class Minimizer {
   NewtonSummary finish(Termination termination) {
     if (termination == Termination::round_off && !convergence_.is_at_round_off())
       return stop(Termination::no_descent, describe_residual());
-    return stop(saddle_.is_here() ? Termination::saddle : termination,
-                convergence_.is_creeping() ? describe_inexact_solves() : std::string());
+    return stop(
+        saddle_.is_here() ? Termination::saddle : termination,
+        termination == Termination::round_off && convergence_.is_creeping() ? describe_inexact_solves() : std::string());
   }
 
   NewtonSummary stop(Termination termination, std::string_view message = {}) {

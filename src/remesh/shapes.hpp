@@ -27,9 +27,9 @@ struct AddedMaterial {
 
 using Shapes = std::vector<std::shared_ptr<const Shape>>;
 
-/// Moves vertices of surfaces with a shape onto it at rest, and splits edges there that contact may
-/// see to be straight: within a step it may act on them, and their middles are farther off than a quarter of dhat. Fields
-/// at a moved vertex are those of the nearest cell, extrapolated as far as that inverts and meets nothing; else as `remesh`.
+/// Moves vertices of surfaces with a shape onto it at rest, and splits edges along which it turns far, or that contact may
+/// see to be straight: within a step it may act on them, and their middles are farther off than a quarter of dhat. Fields at
+/// a moved vertex are those of the nearest cell, extrapolated as far as that inverts and meets nothing; else as `remesh`.
 template <int Dim>
 RemeshReport put_on_shapes(const Shapes& shapes, Mesh<Dim>& mesh, RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                            const RemeshOptions& options, RemeshMemory& memory, Strata<Dim>& strata,

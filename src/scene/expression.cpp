@@ -129,7 +129,10 @@ class ExpressionParser {
   void list() {
     sum();
     while (take(',')) {
-      if (is_between_digits(position_ - 1)) --position_, fail("','", "'.': numbers have a decimal point");
+      if (is_between_digits(position_ - 1)) {
+        --position_;
+        fail("','", "'.': numbers have a decimal point");
+      }
       emit({Code::drop}, -1);
       sum();
     }

@@ -251,7 +251,9 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> finer_weights(const CollisionProxy<
     for (const int end : edge) measure[end] += length(edge) / 2;
   for (const auto& edge : proxy.edges)
     for (const double t : {0.5 - kGauss, 0.5 + kGauss}) {
-      const PointOfCell at = locate(mesh, cells[edge[0]], (1 - t) * proxy.rest[edge[0]] + t * proxy.rest[edge[1]]);
+      std::vector<CellId> near = cells[edge[0]];
+      near.insert(near.end(), cells[edge[1]].begin(), cells[edge[1]].end());
+      const PointOfCell at = locate(mesh, near, (1 - t) * proxy.rest[edge[0]] + t * proxy.rest[edge[1]]);
       for (const int end : {0, 1}) {
         const double share = (end == 0 ? 1 - t : t) * length(edge) / 2 / measure[edge[end]];
         for (int k = 0; k < 3; ++k) {

@@ -338,7 +338,7 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
     if (options.stretches) asked.stretches = std::move(stress.stretches);
   }
   if (!options.kinetic_energy && !options.momentum) return;
-  // Velocities of quasistatic steps are increments by time: nothing of the model has them.
+  // Velocities of quasistatic steps are increments by time: no momentum belongs to them.
   const VectorX v = setup.time.has_inertia() ? data.v : VectorX::Zero(data.v.size());
   VectorX product = VectorX::Zero(v.size());
   InertiaEnergy<Dim>(frame.cells, setup.materials, setup.lump_mass ? MassKind::lumped : MassKind::consistent,

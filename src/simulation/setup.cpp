@@ -17,6 +17,7 @@
 #include "energy/shape_entry.hpp"
 #include "fem/locator.hpp"
 #include "itr/core.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "mesh/facet_tags.hpp"
 #include "simulation/coupled_points.hpp"
 #include "simulation/fluid_front.hpp"
@@ -410,14 +411,34 @@ void check_rigid(const Setup<Dim>& setup) {
                "what stays of its motion in /geometry/*/rigid/held, or an obstacle in its place");
 }
 
+/// Surfaces that cannot move at rest.
+template <int Dim>
+std::set<int> tied_or_coupled(const Setup<Dim>& setup) {
+  std::set<int> tags;
+  for (const Tie& tie : setup.ties)
+    for (const auto* side : {&tie.a, &tie.b}) tags.insert(side->begin(), side->end());
+  for (const auto& coupling : couplings_of<Dim>(setup.nodal_loads))
+    tags.insert(coupling->surfaces.begin(), coupling->surfaces.end());
+  return tags;
+}
+
 /// Vertices that the mesh begins with are moved onto their shape, but not far: as far as one is that refines a polygon.
 template <int Dim>
 void check_shapes(const Setup<Dim>& setup) {
   constexpr double kFar = 0.05;  // of the surface's diagonal
   const Mesh<Dim>& mesh = setup.mesh;
   const auto shapes = shapes_of<Dim>(setup.nodal_loads);
+  const std::set<int> kept = tied_or_coupled(setup);
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const Shape& shape = *shapes[i];
+    for (const int tag : shape.surfaces)
+      if (kept.contains(tag))
+        refuse(fmt::format("/shapes/{}/surface", i), fmt::format("surface {}, which is tied or coupled", tag),
+               "a surface whose vertices may move at rest");
+    for (const FacetId f : mesh.live_facets())
+      if (std::ranges::find(shape.surfaces, mesh.facet_tag(f)) != shape.surfaces.end() &&
+          rigid_body_of(setup.materials.at(mesh.body(cell_of_facet(mesh, f)))))
+        refuse(fmt::format("/shapes/{}/surface", i), "a surface of a rigid body", "one of a body that is remeshed");
     if (shape.kind == Shape::Kind::fitted) continue;
     Eigen::AlignedBox<double, Dim> box;
     double farthest = 0;
@@ -431,7 +452,8 @@ void check_shapes(const Setup<Dim>& setup) {
       }
     }
     if (farthest > kFar * box.diagonal().norm())
-      refuse(fmt::format("/shapes/{}", i), fmt::format("a geometry that a vertex of its surface is {:g} m off", farthest),
+      refuse(fmt::format("/shapes/{}", i),
+             fmt::format("a geometry that a vertex of its surface is {} off", setup.units.text(farthest, "m", 3)),
              "one that all vertices of the surface lie on");
   }
 }

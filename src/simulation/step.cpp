@@ -433,7 +433,7 @@ class StepSolver {
   }
 
   /// Puts surfaces onto their shapes around x, and adds to what became of ids. The energy of x jumps as material comes or
-  /// goes; what is lagged acts on neither side.
+  /// goes.
   void take_shapes(std::optional<MeshRenumbering>& renumbering) {
     if (renumbering) settle_chords();
     const State<Dim> unchanged = next_;

@@ -43,10 +43,11 @@ template <int Dim>
 StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& before, State<Dim>& after, State<Dim>* start,
                              const Attempt& attempt, StepResult failed);
 
-/// Where forces that act as in the last step lead to from the state before this one, at x; without inertia, where its
-/// motion goes on, unless the mesh changes between steps and the motion with it. Empty in statics.
+/// Where forces that act as in the last step lead to from x, with the history and the number of the step. Without inertia,
+/// where the last motion goes on: not in the first step, by Newmark, or where the mesh changes between steps. Empty in
+/// statics.
 template <int Dim>
-VectorX expected_positions(const StepSetup<Dim>& setup, const State<Dim>& before, const VectorX& x);
+VectorX expected_positions(const StepSetup<Dim>& setup, const State<Dim>& step, const VectorX& x);
 
 /// Adds the effort of an attempt whose state is dropped: its operations led nowhere.
 void add_dropped(StepReport dropped, StepReport& report);

@@ -134,15 +134,18 @@ StepResult take_shorter_step(const StepTools<Dim>& tools, const State<Dim>& befo
 }
 
 template <int Dim>
-VectorX expected_positions(const StepSetup<Dim>& setup, const State<Dim>& before, const VectorX& x) {
+VectorX expected_positions(const StepSetup<Dim>& setup, const State<Dim>& step, const VectorX& x) {
   const TimeOptions& time = setup.time;
   if (time.is_static) return {};
-  if (!time.has_inertia()) return setup.remesh.enabled ? VectorX() : VectorX(x + time.dt * before.history.v[0]);
-  VectorX expected = TimeIntegrator(time).predictor(before.history);
-  if (time.adaptive.enabled && !before.history.a.empty())
-    expected += TimeIntegrator(time).scaling(before.history) * before.history.a[0];  // steps may differ in length
-  else if (before.deviation.size() == expected.size())
-    expected += before.deviation;
+  if (!time.has_inertia()) {
+    const bool has_rate = step.step > 1 && !TimeIntegrator(time).uses_acceleration();
+    return has_rate && !setup.remesh.enabled ? VectorX(x + time.dt * step.history.v[0]) : VectorX();
+  }
+  VectorX expected = TimeIntegrator(time).predictor(step.history);
+  if (time.adaptive.enabled && !step.history.a.empty())
+    expected += TimeIntegrator(time).scaling(step.history) * step.history.a[0];  // steps may differ in length
+  else if (step.deviation.size() == expected.size())
+    expected += step.deviation;
   return expected;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Puts vertices of surfaces that have a shape onto it, at rest, and splits edges there that are too far off it for contact.
+// Puts vertices of surfaces that have a shape onto it, at rest, and splits edges there that are too far off it.
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -142,7 +142,7 @@ class ShapeOperation {
     return std::ranges::find(kept, mesh_.facet_tag(f)) != kept.end();
   }
   bool stays(VertexId v) const {
-    return mesh_.is_on_axis(v) || mesh_.is_on_interface(v) ||
+    return mesh_.is_on_axis(v) || mesh_.is_on_interface(v) || mesh_.vertex_tag(v) != kNoTag ||
            std::ranges::any_of(mesh_.facets_of(v), [&](FacetId f) { return is_kept(f); });
   }
 
@@ -274,16 +274,18 @@ class ShapeOperation {
   double sag_to_mend(const EdgeKey& edge) {
     const Carriers<Dim> carriers(mesh_, shapes_, edge);
     if (!carriers.has_shape()) return 0;
+    for (const VertexId v : edge)  // halves would be no nearer to the shape
+      if (carriers.distance(mesh_.rest(v)) > kWorthMoving * tolerance_) return 0;
     const double sag = carriers.distance((mesh_.rest(edge[0]) + mesh_.rest(edge[1])) / 2);
     const bool is_coarse = sag > kMostTurn / 8 * (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).norm();
     if (!is_coarse && !(queries_.has_contact() && sag > carriers.most_sag(kMostOverhang * queries_.context().contact.dhat) &&
                         may_touch(edge, sag)))
       return 0;
     const auto both = [&](auto&& holds) { return holds(edge[0]) && holds(edge[1]); };
-    const bool stays = both([&](VertexId v) { return mesh_.is_on_axis(v); }) ||
-                       both([&](VertexId v) { return mesh_.is_on_interface(v); }) ||
-                       std::ranges::any_of(mesh_.facets_of_edge(edge), [&](FacetId f) { return is_kept(f); });
-    return stays ? 0 : sag;
+    const bool is_fixed = both([&](VertexId v) { return mesh_.is_on_axis(v); }) ||
+                          both([&](VertexId v) { return mesh_.is_on_interface(v); }) ||
+                          std::ranges::any_of(mesh_.facets_of_edge(edge), [&](FacetId f) { return is_kept(f); });
+    return is_fixed ? 0 : sag;
   }
 
   /// Splits the edges that are too far off their shapes, those farthest off first, and returns the new ones.
