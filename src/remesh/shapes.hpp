@@ -23,6 +23,9 @@ struct AddedMaterial {
   };
   std::vector<Piece> pieces;
   std::vector<VertexId> moved;
+  int compressed = 0;   ///< of these, vertices whose new material begins compressed, as something was in the way
+  int off = 0;          ///< vertices that stay off their shape
+  double farthest = 0;  ///< of these, at most [m]
 };
 
 using Shapes = std::vector<std::shared_ptr<const Shape>>;

@@ -350,12 +350,23 @@ std::optional<MeshRenumbering> shape_and_project(const StepTools<Dim>& tools, co
                                                  StepReport& report) {
   const Shapes shapes = shapes_of<Dim>(tools.setup.nodal_loads);
   AddedMaterial<Dim> added;
-  return change_and_project(
-      tools, problem, before, state, x, report, [&](auto&&... all) { return put_on_shapes<Dim>(shapes, all..., added); },
-      [&](const MeshRenumbering& renumbering) {
-        for (VertexId& v : added.moved) v = renumbering.vertex[v];
-        if (tools.setup.time.has_inertia()) keep_momenta(tools.setup, before, added, state);
-      });
+  const auto operate = [&](auto&&... all) {
+    RemeshReport operations = put_on_shapes<Dim>(shapes, all..., added);
+    if (added.compressed > 0)
+      tools.logger.warning(
+          fmt::format("step {}: {} vertices were put onto their shapes where something is in the way: the material there "
+                      "begins compressed; leave room for the shapes at rest",
+                      state.step, added.compressed));
+    if (added.off > 0)
+      tools.logger.warning(
+          fmt::format("step {}: {} vertices stay off their shapes, by up to {}: cells behind them are too thin", state.step,
+                      added.off, tools.setup.units.text(added.farthest, "m", 3)));
+    return operations;
+  };
+  return change_and_project(tools, problem, before, state, x, report, operate, [&](const MeshRenumbering& renumbering) {
+    for (VertexId& v : added.moved) v = renumbering.vertex[v];
+    if (tools.setup.time.has_inertia()) keep_momenta(tools.setup, before, added, state);
+  });
 }
 
 template <int Dim>

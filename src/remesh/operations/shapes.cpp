@@ -128,6 +128,8 @@ class ShapeOperation {
     for (const VertexId v : vertices) put_on_shape(v);
     std::vector<EdgeKey> edges = surface_edges();
     for (int round = 0; round < kMostRounds && !edges.empty(); ++round) edges = split(edges);
+    for (const VertexId v : mesh_.live_vertices())
+      if (mesh_.is_boundary(v) && !stays(v)) note_if_off(v);
   }
 
  private:
@@ -146,6 +148,15 @@ class ShapeOperation {
            std::ranges::any_of(mesh_.facets_of(v), [&](FacetId f) { return is_kept(f); });
   }
 
+  void note_if_off(VertexId v) {
+    const Carriers<Dim> carriers(mesh_, shapes_, {v, v});
+    if (!carriers.has_shape()) return;
+    const double distance = carriers.distance(mesh_.rest(v));
+    if (distance <= kWorthMoving * tolerance_) return;
+    ++added_.off;
+    added_.farthest = std::max(added_.farthest, distance);
+  }
+
   void put_on_shape(VertexId v) {
     const Carriers<Dim> carriers(mesh_, shapes_, {v, v});
     if (!carriers.has_shape() || carriers.distance(mesh_.rest(v)) <= kWorthMoving * tolerance_ || stays(v)) return;
@@ -160,6 +171,8 @@ class ShapeOperation {
       const Edit<Dim> edit = make_move(v, *place, part);
       if (!session_.gate().passes(edit, session_.scratch().gate)) continue;
       note_material(v, edit);
+      if (part < 1) ++added_.compressed;
+      ++session_.report().smooths.tried;
       session_.commit_unjudged(edit, session_.report().smooths);
       return;
     }
@@ -302,6 +315,7 @@ class ShapeOperation {
         continue;
       }
       const Edit<Dim> edit = make_split(mesh_, edge);
+      ++session_.report().splits.tried;
       if (!session_.commit_unjudged(edit, session_.report().splits)) continue;
       const VertexId v = mesh_.node_slots() - 1 - static_cast<int>(edit.inserted_nodes.size());
       put_on_shape(v);
