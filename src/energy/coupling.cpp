@@ -150,6 +150,7 @@ template <int Dim>
 typename CouplingEnergy<Dim>::Open CouplingEnergy<Dim>::open_at(const MatrixX& U, const Means& means,
                                                                 const Mat<3>& R) const {
   Open open;
+  open.nodes.resize(Dim, 0);
   const Vec<Dim> u = point_.displacement(means, R) - held_.displacement;
   const Mat<3> seen = held_.turned.transpose() * R;
   for (int c = 0; c < Dim; ++c)
