@@ -68,7 +68,9 @@ TEST(Facade, ErrorsNameArrayIndexFoundAndExpected) {
   std::vector<double> forces(32);
   forces[7] = std::numeric_limits<double>::infinity();
   EXPECT_NE(message_of([&] { simulation.set_forces(forces); }).find("forces[7]"), std::string::npos);
-  EXPECT_EQ(message_of([&] { simulation.step(-1); }), "dt: found -1; expected a number > 0");
+  const std::string expected = "; expected a number > 0 of which a double holds the square";
+  EXPECT_EQ(message_of([&] { simulation.step(-1); }), "dt: found -1" + expected);
+  EXPECT_EQ(message_of([&] { simulation.step(1e-300); }), "dt: found 1e-300" + expected);
   AnySimulation other(block_model<3>());
   EXPECT_NE(message_of([&] { simulation.restore(other.save()); }).find("another simulation"), std::string::npos);
 }

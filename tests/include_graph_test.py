@@ -52,7 +52,7 @@ MOST_PUBLIC = 16
 
 # Plain values that describe a simulation are open to `scene`, and made of these alone.
 EXTRA = {"scene": {"setup.hpp", "simulation/unsupported.hpp", "energy/elastic/law_table.hpp", "energy/rigid_body.hpp",
-                   "energy/support.hpp", "energy/shape_entry.hpp"}}
+                   "energy/support.hpp", "geometry/shape.hpp"}}
 SETUP = {"core.hpp", "energy.hpp", "mesh.hpp", "options.hpp"}
 
 # Third-party header -> the modules that may know it.

@@ -37,6 +37,7 @@ struct Obstacles {
 };
 
 struct Retraction;  // opaque
+struct Shape;       // opaque
 
 /// A surface that collides in place of the bodies' boundary. Its vertices are displaced by `weights` times the displacements
 /// of the mesh's vertices.
@@ -162,6 +163,7 @@ struct ITR_EXPORT StepSetup {
   std::vector<Fluid> fluids;
   std::vector<Cavity> cavities;
   std::vector<Tie> ties;
+  std::vector<std::shared_ptr<const Shape>> shapes;  ///< geometries of surfaces (docs/theory.md, "True shapes")
   SpaceTimeFunction<Dim> body_acceleration;  ///< [m/s^2], positive along the axes: gravity is (0, -9.81); empty: none
 
   std::vector<TermFactory<Dim>> nodal_loads;  ///< dead loads on vertices, as point_forces makes them

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "arrays.hpp"
 #include "core/parallel.hpp"
@@ -46,24 +47,6 @@ SpaceTimeFunction<Dim> as_vector(std::string place, HostFunction f) {
 
 std::string of(const std::string& quantity, const std::string& part) { return quantity + " of '" + part + "'"; }
 
-/// Joins row(0), row(1), ... one after the other.
-template <typename Row>
-std::vector<int> joined(int count, const Row& row) {
-  std::vector<int> ids;
-  for (int i = 0; i < count; ++i) ids.insert(ids.end(), row(i).begin(), row(i).end());
-  return ids;
-}
-template <typename Value>
-std::vector<int> listed(int count, const Value& value) {
-  std::vector<int> values;
-  for (int i = 0; i < count; ++i) values.push_back(value(i));
-  return values;
-}
-
-VectorX as_field(std::span<const double> values) {
-  return Eigen::Map<const VectorX>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
 template <int Dim>
 VectorX rest_of(const Mesh<Dim>& mesh) {
   const std::vector<Vec<Dim>>& nodes = mesh.rest();
@@ -82,12 +65,12 @@ void replace(std::vector<Condition>& conditions, Condition condition, bool is_nu
 }  // namespace
 
 struct AnySimulation::Impl {
-  /// Simulation and locator of one dimension.
+  /// Simulation and locators of one dimension.
   template <int Dim>
   struct Of {
     Simulation<Dim> simulation;
-    std::shared_ptr<const Locator<Dim>> locator;  ///< of a mesh that was needed
-    std::uint64_t locator_revision = 0;           ///< which that was
+    std::map<int, std::shared_ptr<const Locator<Dim>>> locators;  ///< by body; kNone: of the whole mesh
+    std::uint64_t locator_revision = 0;                           ///< of the mesh that they are of
     std::map<std::string, std::vector<int>> obstacle_vertices;
     std::map<std::string, std::size_t> term_places;  ///< in Setup::terms
 
@@ -98,20 +81,33 @@ struct AnySimulation::Impl {
       if (remeshes && simulation.setup().remesh.curve.enabled)
         refuse(place, "/space/remesh/curve/enabled", "a mesh of which the edges stay straight");
     }
-    /// Makes the function of values by vertex, linear on the cells of the present mesh, or by node, quadratic along its
-    /// curved edges. `of_body` finds cells of one body alone; null: all.
+    /// Finds cells of a body, as others may have the same points at rest; kNone: of all.
+    const std::shared_ptr<const Locator<Dim>>& locator_of(int body) {
+      if (locator_revision != mesh().revision()) locators.clear();
+      locator_revision = mesh().revision();
+      auto& locator = locators[body];
+      if (locator) return locator;
+      std::vector<CellId> cells;
+      for (const CellId c : mesh().live_cells())
+        if (body == kNone || mesh().body(c) == body) cells.push_back(c);
+      return locator = std::make_shared<Locator<Dim>>(mesh(), cells);
+    }
     template <int Components = Dim>
-    std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(
-        const std::string& name, std::span<const double> values, std::shared_ptr<const Locator<Dim>> of_body = nullptr) {
+    void check_nodal(const std::string& name, std::span<const double> values) const {
       const auto by_node = static_cast<std::size_t>(Components * mesh().num_nodes());
       const bool is_by_node = values.size() == by_node;
       check_array(name, values, is_by_node ? by_node : static_cast<std::size_t>(Components * mesh().num_vertices()));
-      if (!of_body && (!locator || locator_revision != mesh().revision())) {
-        locator = std::make_shared<Locator<Dim>>(mesh());
-        locator_revision = mesh().revision();
-      }
-      return [f = nodal_function<Dim>(of_body ? of_body : locator, as_field(values), Components)](
-                 const RestPoint<Dim>& X, double) { return Vec<Components>(f(X)); };
+    }
+    /// Makes the function of values by vertex, linear on the cells of the present mesh, or by node, quadratic along its
+    /// curved edges.
+    template <int Components = Dim>
+    std::function<Vec<Components>(const RestPoint<Dim>& X, double t)> nodal(const std::string& name,
+                                                                            std::span<const double> values,
+                                                                            int body = kNone) {
+      check_nodal<Components>(name, values);
+      return [f = nodal_function<Dim>(locator_of(body), as_field(values), Components)](const RestPoint<Dim>& X, double) {
+        return Vec<Components>(f(X));
+      };
     }
     /// Puts a term in the place of the one of its name; a null one goes.
     void set_term(const std::string& name, TermFactory<Dim> term) {
@@ -142,7 +138,7 @@ struct AnySimulation::Impl {
   static Of<Dim> make(const Model& model, linear::Registry& registry, const Logger& logger,
                       std::vector<std::string>& warnings) {
     Setup<Dim> setup = model.setup<Dim>(warnings);
-    return {Simulation<Dim>(std::move(setup), registry, logger), nullptr, 0, {}, {}};
+    return {Simulation<Dim>(std::move(setup), registry, logger), {}, 0, {}, {}};
   }
   using Either = std::variant<Of<2>, Of<3>>;
 
@@ -323,17 +319,16 @@ void AnySimulation::set_acceleration(std::span<const double> accelerations) {
 
 void AnySimulation::set_eigenstrain(std::span<const double> strains) {
   impl_->visit([&]<int Dim>(Impl::Of<Dim>& d) {
-    std::map<int, std::vector<CellId>> cells;  // by body: others may have the same points at rest
-    for (CellId c = 0; c < d.mesh().cell_slots(); ++c) cells[d.mesh().body(c)].push_back(c);
+    if (!strains.empty()) d.template check_nodal<1>("strains", strains);
+    std::set<int> bodies;
+    for (const CellId c : d.mesh().live_cells()) bodies.insert(d.mesh().body(c));
     for (auto& [body, material] : d.simulation.conditions().materials) {
-      if (rigid_body_of(material) || !cells.contains(body)) continue;
+      if (rigid_body_of(material) || !bodies.contains(body)) continue;
       Eigenstrain eigenstrain;
-      if (!strains.empty()) {
-        const auto of_body = std::make_shared<Locator<Dim>>(d.mesh(), cells.at(body));
-        eigenstrain = [strain = d.template nodal<1>("strains", strains, of_body)](const Vec<3>& X, double t) -> Mat<3> {
+      if (!strains.empty())
+        eigenstrain = [strain = d.template nodal<1>("strains", strains, body)](const Vec<3>& X, double t) -> Mat<3> {
           return strain(Vec<Dim>(X.head<Dim>()), t)[0] * Mat<3>::Identity();
         };
-      }
       material.eigenstrain = std::move(eigenstrain);
       material.eigenstrain_varies = !strains.empty();
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Checks of what a program hands in: errors name the array, the index, what was found and what was expected.
+// Arrays of programs, and checks of what they hand in: errors name the array, the index, what was found and what was
+// expected.
 #pragma once
 
 #include <fmt/format.h>
@@ -7,8 +8,10 @@
 #include <cmath>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "itr/core.hpp"
+#include "itr/types.hpp"
 
 namespace itr {
 
@@ -43,6 +46,24 @@ inline void check_block(const std::string& name, std::span<const int> vertices, 
                         std::size_t count) {
   check_ids(name + ".vertices", vertices, count);
   check_finite(name + ".block", block);
+}
+
+/// Joins row(0), row(1), ... one after the other.
+template <typename Row>
+std::vector<int> joined(int count, const Row& row) {
+  std::vector<int> ids;
+  for (int i = 0; i < count; ++i) ids.insert(ids.end(), row(i).begin(), row(i).end());
+  return ids;
+}
+template <typename Value>
+std::vector<int> listed(int count, const Value& value) {
+  std::vector<int> values;
+  for (int i = 0; i < count; ++i) values.push_back(value(i));
+  return values;
+}
+
+inline VectorX as_field(std::span<const double> values) {
+  return Eigen::Map<const VectorX>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
 }  // namespace itr

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "combined_conditions.hpp"
 #include "eigenstrain.hpp"
 #include "fluids.hpp"
 #include "function.hpp"
@@ -122,29 +123,10 @@ class ConditionReader {
     };
   }
 
-  /// Facets of several sets have conditions of each: in each component that of the first entry counts.
   void hold(const Node& node, DirichletCondition<Dim> added) {
-    auto& all = setup_.dirichlet;
-    const auto earlier =
-        std::find_if(all.begin(), all.end(), [&](const DirichletCondition<Dim>& other) { return other.tag == added.tag; });
-    if (earlier == all.end()) return all.push_back(std::move(added));
-    bool loses = false;
-    for (int c = 0; c < Dim; ++c) {
-      loses |= added.components[c] && earlier->components[c];
-      added.components[c] = added.components[c] && !earlier->components[c];
-      earlier->components[c] = earlier->components[c] || added.components[c];
-    }
-    if (loses)
+    if (!add_condition(setup_.dirichlet, std::move(added)))
       warnings_.push_back(node.pointer() +
                           ": an entry before it holds a part of this set in the same directions and wins there");
-    earlier->displacement = [first = earlier->displacement, second = added.displacement, of_second = added.components](
-                                const RestPoint<Dim>& X, double t) {
-      Vec<Dim> value = first(X, t);
-      const Vec<Dim> other = second(X, t);
-      for (int c = 0; c < Dim; ++c)
-        if (of_second[c]) value[c] = other[c];
-      return value;
-    };
   }
 
   /// Steps whose lengths are chosen end where values are not smooth in time.
@@ -191,19 +173,6 @@ class ConditionReader {
     }
   }
 
-  /// Adds a load, to that which a facet of several sets has already.
-  template <typename Condition, typename Function>
-  static void load(std::vector<Condition>& all, Condition added, Function Condition::*value) {
-    const auto earlier =
-        std::find_if(all.begin(), all.end(), [&](const Condition& other) { return other.tag == added.tag; });
-    if (earlier == all.end()) return all.push_back(std::move(added));
-    using Value = std::invoke_result_t<Function, const RestPoint<Dim>&, double>;
-    Function& sum = (*earlier).*value;
-    sum = [first = sum, second = added.*value](const RestPoint<Dim>& X, double t) {
-      return Value(first(X, t) + second(X, t));
-    };
-  }
-
   void read_neumann() {
     Seen seen;
     for (const Node& node : boundary_["neumann_boundary"].items()) {
@@ -214,7 +183,7 @@ class ConditionReader {
       for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(value.function, vertices_with(tag), times(), node["value"]);
         if (value.is_zero) continue;
-        load(setup_.neumann, {tag, value.function}, &NeumannCondition<Dim>::traction);
+        add_load<Dim>(setup_.neumann, NeumannCondition<Dim>{tag, value.function}, &NeumannCondition<Dim>::traction);
       }
     }
   }
@@ -233,7 +202,8 @@ class ConditionReader {
       };
       for (const int tag : loaded_tags(node, seen)) {
         check_defined<Dim>(along_normal, vertices_with(tag), times(), node["value"]);
-        if (!value.is_zero) load(setup_.neumann, {tag, along_normal}, &NeumannCondition<Dim>::traction);
+        if (!value.is_zero)
+          add_load<Dim>(setup_.neumann, NeumannCondition<Dim>{tag, along_normal}, &NeumannCondition<Dim>::traction);
       }
     }
   }
@@ -293,7 +263,8 @@ class ConditionReader {
       const std::vector<int> tags = loaded_tags(node, seen);
       for (const int tag : tags) check_defined<Dim>(as_vector, vertices_with(tag), times(), node["value"]);
       const auto press = [&](int tag) {
-        if (!value.is_zero) load(setup_.pressure, {tag, value.function}, &PressureCondition<Dim>::pressure);
+        if (!value.is_zero)
+          add_load<Dim>(setup_.pressure, PressureCondition<Dim>{tag, value.function}, &PressureCondition<Dim>::pressure);
       };
       if (const std::optional<Fluid> fluid = read_fluid(node, tags, sets_, facet_tags_, setup_.fluids)) {
         std::vector<int>& named = setup_.names.surfaces["wet " + text_of(read_condition_label(node["id"]))];

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "shapes.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <utility>
 
-#include "energy/shape_entry.hpp"
+#include "geometry/shape.hpp"
 #include "supports.hpp"
 
 namespace itr::scene {
@@ -27,19 +31,25 @@ double read_length(const Node& node, const char* key) {
   return node[key].positive(1);
 }
 
+constexpr std::pair<const char*, Shape::Kind> kTypes[] = {
+    {"plane", Shape::Kind::plane},       {"sphere", Shape::Kind::sphere}, {"circle", Shape::Kind::sphere},
+    {"cylinder", Shape::Kind::cylinder}, {"cone", Shape::Kind::cone},     {"torus", Shape::Kind::torus},
+    {"fitted", Shape::Kind::fitted}};
+
 Shape read_shape(const Node& node, int dim, const std::set<int>& with_facets, const Sets& sets) {
   using enum Shape::Kind;
-  static const std::vector<std::string> kNames{"plane", "sphere", "circle", "cylinder", "cone", "torus", "fitted"};
-  static constexpr Shape::Kind kKinds[] = {plane, sphere, sphere, cylinder, cone, torus, fitted};
   Shape shape{.surfaces = read_surfaces(node["surface"], sets, with_facets, "the ids of the surfaces that have the shape")};
-  if (!node.has("type")) node.fail("no type", "one of plane, sphere, circle, cylinder, cone, torus, fitted");
-  const int type = node["type"].choice(kNames, 0);
-  shape.kind = kKinds[type];
+  std::vector<std::string> types;
+  for (const auto& [name, kind] : kTypes) types.emplace_back(name);
+  if (!node.has("type")) node.fail("no type", fmt::format("one of {}", fmt::join(types, ", ")));
+  const int chosen = node["type"].choice(types, 0);
+  const std::string& type = types[chosen];
+  shape.kind = kTypes[chosen].second;
   if (node.has("sag")) shape.sag = node["sag"].positive(1);
   const bool is_round = shape.kind == cylinder || shape.kind == cone || shape.kind == torus;
-  if (is_round && dim == 2) node["type"].fail("\"" + kNames[type] + "\" in 2D", "plane, circle or fitted");
+  if (is_round && dim == 2) node["type"].fail("\"" + type + "\" in 2D", "plane, circle or fitted");
   if (shape.kind == fitted && dim == 3) node["type"].fail("\"fitted\" in 3D", "a geometry: fitted is for 2D");
-  if (kNames[type] == "circle" && dim == 3) node["type"].fail("\"circle\" in 3D", "sphere");
+  if (type == "circle" && dim == 3) node["type"].fail("\"circle\" in 3D", "sphere");
   if (shape.kind == fitted) {
     constexpr double kFeatureAngle = 40;  // keeps corners of octagons and lets 12 of them be a circle
     shape.angle = std::numbers::pi / 180 * node["feature_angle"].positive(kFeatureAngle);
@@ -70,7 +80,7 @@ void read_shapes(const Node& root, const Sets& sets, Setup<Dim>& setup) {
   std::set<int> taken;
   for (const Node& node : root["shapes"].items()) {
     const auto shape = std::make_shared<const Shape>(read_shape(node, Dim, with_facets, sets));
-    setup.nodal_loads.push_back(ShapeEntry<Dim>{shape});
+    setup.shapes.push_back(shape);
     for (const int tag : shape->surfaces)
       if (!taken.insert(tag).second)
         node["surface"].fail(abbreviate(node["surface"].json()) + ", which another shape has, too", "one shape a surface");

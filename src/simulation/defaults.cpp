@@ -9,7 +9,8 @@
 
 #include "barrier_stiffness.hpp"
 #include "energy/rigid_body.hpp"
-#include "energy/shape_entry.hpp"
+#include "energy/support.hpp"
+#include "geometry/shape.hpp"
 #include "itr/core.hpp"
 #include "itr/setup.hpp"
 #include "mesh/facet_measure.hpp"
@@ -341,11 +342,10 @@ void choose_other_tolerances(RemeshOptions& remesh, FollowsStoredEnergy& follows
 
 /// Fits curves through the surfaces of the mesh that is there.
 template <int Dim>
-void fit_shapes(const Mesh<Dim>& mesh, std::vector<TermFactory<Dim>>& loads) {
-  for (auto& load : loads) {
-    auto* const entry = load.template target<ShapeEntry<Dim>>();
-    if (Dim == 3 || !entry || entry->value->kind != Shape::Kind::fitted) continue;
-    Shape shape = *entry->value;
+void fit_shapes(const Mesh<Dim>& mesh, std::vector<std::shared_ptr<const Shape>>& shapes) {
+  for (auto& unfitted : shapes) {
+    if (unfitted->kind != Shape::Kind::fitted) continue;
+    Shape shape = *unfitted;
     std::vector<std::array<Vec<3>, 2>> segments;
     for (const FacetId f : mesh.live_facets())
       if (std::ranges::find(shape.surfaces, mesh.facet_tag(f)) != shape.surfaces.end()) {
@@ -353,7 +353,7 @@ void fit_shapes(const Mesh<Dim>& mesh, std::vector<TermFactory<Dim>>& loads) {
         for (int k = 0; k < 2; ++k) segment[k].template head<Dim>() = mesh.rest(mesh.facet(f)[k]);
       }
     shape.fitted = fit_curves(segments, shape.angle);
-    entry->value = std::make_shared<const Shape>(std::move(shape));
+    unfitted = std::make_shared<const Shape>(std::move(shape));
   }
 }
 
@@ -378,11 +378,11 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
     if (contact.has_friction()) words.push_back(std::move(chosen));
   }
   if (!remesh.enabled) {
-    if (!shapes_of<Dim>(this->nodal_loads).empty())
+    if (!this->shapes.empty())
       words.emplace_back("surfaces keep their facets: /shapes acts where meshes change, /space/remesh/enabled");
     return words;
   }
-  fit_shapes(mesh, this->nodal_loads);
+  if constexpr (Dim == 2) fit_shapes(mesh, this->shapes);
   if (!remesh.split.min_edge_length) remesh.split.min_edge_length = kLeastSplitEdge * rest_diagonal(mesh);
   if (!remesh.split.acceptance_tolerance) words.push_back(choose_split_tolerance(*this, remesh));
   choose_other_tolerances(remesh, this->follows_stored_energy);

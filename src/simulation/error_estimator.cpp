@@ -249,10 +249,10 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> finer_weights(const CollisionProxy<
   const auto length = [&](const auto& edge) { return (proxy.rest[edge[0]] - proxy.rest[edge[1]]).norm(); };
   for (const auto& edge : proxy.edges)
     for (const int end : edge) measure[end] += length(edge) / 2;
-  for (const auto& edge : proxy.edges)
+  for (const auto& edge : proxy.edges) {
+    std::vector<CellId> near = cells[edge[0]];
+    near.insert(near.end(), cells[edge[1]].begin(), cells[edge[1]].end());
     for (const double t : {0.5 - kGauss, 0.5 + kGauss}) {
-      std::vector<CellId> near = cells[edge[0]];
-      near.insert(near.end(), cells[edge[1]].begin(), cells[edge[1]].end());
       const PointOfCell at = locate(mesh, near, (1 - t) * proxy.rest[edge[0]] + t * proxy.rest[edge[1]]);
       for (const int end : {0, 1}) {
         const double share = (end == 0 ? 1 - t : t) * length(edge) / 2 / measure[edge[end]];
@@ -264,18 +264,10 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> finer_weights(const CollisionProxy<
         }
       }
     }
+  }
   Eigen::SparseMatrix<double, Eigen::RowMajor> weights(proxy.weights.rows(), mesh.num_nodes());
   weights.setFromTriplets(entries.begin(), entries.end());
   return weights;
-}
-
-/// The setup of the steps in a finer space.
-template <int Dim>
-StepSetup<Dim> finer_setup(const StepSetup<Dim>& setup, const FinerSpace<Dim>& space) {
-  StepSetup<Dim> finer = setup;
-  if constexpr (Dim == 2)
-    if (finer.proxy) finer.proxy->weights = finer_weights(*setup.proxy, space.mesh);
-  return finer;
 }
 
 /// Changes by d-hat, friction's velocity, lagging and the solver on the mesh itself, by ErrorSource. Gradients at x are
@@ -436,8 +428,9 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
   const FinerSpace<Dim>& space = *space_;
   const History history = finer_history(state);
   const VectorX fine_x = space.prolong(x);
-  const StepSetup<Dim> finer = finer_setup(setup, space);
-  StepProblem<Dim> fine(finer, space.mesh, history, state.t, cache_, problem.stiffness());
+  std::optional<StepSetup<Dim>> finer;
+  if (space.proxy) (finer = setup)->proxy = space.proxy;
+  StepProblem<Dim> fine(finer ? *finer : setup, space.mesh, history, state.t, cache_, problem.stiffness());
   fine.lag_as(problem, fine_x);
   const auto at_fine_x = fine.gradients(fine_x);
   const Change change{at_fine_x.all - space.inject(at_x.all), at_fine_x.contact - space.inject(at_x.contact),
@@ -526,8 +519,11 @@ ErrorFields ErrorEstimator<Dim>::estimate(const StepSetup<Dim>& setup, const Sta
   report.no_bar = why_unknown(setup, state.mesh);
   if (!report.no_bar.empty()) return {};
   const int obstacles = static_cast<int>(setup.obstacles.rest.size());
-  if (!space_ || space_->revision != state.mesh.revision() || space_->obstacle_vertices != obstacles)
+  if (!space_ || space_->revision != state.mesh.revision() || space_->obstacle_vertices != obstacles) {
     space_ = std::make_unique<FinerSpace<Dim>>(state.mesh, obstacles);
+    if constexpr (Dim == 2)
+      if (setup.proxy) (space_->proxy = setup.proxy)->weights = finer_weights(*setup.proxy, space_->mesh);
+  }
   ErrorFields errors;
   errors.sources.resize(kErrorSources);
   const auto as_solved = problem.gradients(x);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,9 +37,10 @@ struct FinerSpace {
   std::uint64_t revision;  ///< of the coarse mesh
   int obstacle_vertices;
   Mesh<Dim> mesh;
-  std::vector<int> fine_of_coarse;  ///< node that is the same one
-  VertexMap<Dim> map;               ///< of coarse nodes to those here
-  std::vector<char> is_new;         ///< by node: no coarse one is there
+  std::vector<int> fine_of_coarse;             ///< node that is the same one
+  VertexMap<Dim> map;                          ///< of coarse nodes to those here
+  std::vector<char> is_new;                    ///< by node: no coarse one is there
+  std::optional<CollisionProxy<Dim>> proxy{};  ///< what touches in place of the boundary, where gaps are averaged
 
  private:
   typename VertexMap<Dim>::Weights find_weights(const Mesh<Dim>& coarse);

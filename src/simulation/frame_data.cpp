@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -20,6 +21,7 @@
 #include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "fem/locator.hpp"
+#include "mesh/cell_of_facet.hpp"
 #include "simulation/contact_pressure.hpp"
 #include "simulation/contact_surface.hpp"
 #include "simulation/coupled_points.hpp"
@@ -174,12 +176,19 @@ ForceCurvePoint curve_point(const Setup<Dim>& setup, const State<Dim>& state, co
   return point;
 }
 
-/// Whether a target is that of a spring on a rigid body.
+/// Names of the springs on rigid bodies.
 template <int Dim>
-bool is_spring_of_rigid(const Setup<Dim>& setup, const ForceTarget& target) {
-  return has_rigid_bodies(setup.materials) &&
-         std::ranges::any_of(springs_of<Dim>(setup.nodal_loads),
-                             [&](const auto& spring) { return spring->name == target.name; });
+std::set<std::string> springs_of_rigid(const Setup<Dim>& setup, const Mesh<Dim>& mesh) {
+  std::set<std::string> names;
+  if (!has_rigid_bodies(setup.materials)) return names;
+  const auto springs = springs_of<Dim>(setup.nodal_loads);
+  if (springs.empty()) return names;
+  std::set<int> rigid;  // tags of their surfaces
+  for (const FacetId f : mesh.live_facets())
+    if (rigid_body_of(setup.materials.at(mesh.body(cell_of_facet(mesh, f))))) rigid.insert(mesh.facet_tag(f));
+  for (const auto& spring : springs)
+    if (std::ranges::any_of(spring->surfaces, [&](int tag) { return rigid.contains(tag); })) names.insert(spring->name);
+  return names;
 }
 
 /// Forces without those on rigid bodies as wholes, which some of their nodes have in their place.
@@ -323,10 +332,10 @@ void add_asked(const Setup<Dim>& setup, const FrameCells<Dim>& frame, const Stat
   if (options.friction_forces) asked.forces.friction = all.friction;
   if (options.reaction_forces) asked.forces.reaction = all.reaction;
   if (options.applied_forces) asked.forces.applied = all.applied;
+  const std::set<std::string> of_rigid = springs_of_rigid(setup, state.mesh);
+  const NodalForces less = of_rigid.empty() ? NodalForces() : without_wholes(all, setup, state.mesh);
   for (const ForceTarget& target : options.curves)
-    asked.curves.push_back(is_spring_of_rigid(setup, target)
-                               ? curve_point(setup, state, without_wholes(all, setup, state.mesh), errors, target)
-                               : curve_point(setup, state, all, errors, target));
+    asked.curves.push_back(curve_point(setup, state, of_rigid.contains(target.name) ? less : all, errors, target));
   add_cavities(setup, frame.cells, state, asked.curves);
   asked.points = points_of(setup, state, errors);
   if (options.contact_pressure) asked.contact_pressure = contact_pressure(setup, state.mesh, data.x, all.contact);

@@ -13,7 +13,6 @@
 #include "core/timer.hpp"
 #include "energy/cavity.hpp"
 #include "energy/inertia.hpp"
-#include "energy/shape_entry.hpp"
 #include "geometry/bvh.hpp"
 #include "itr/energy.hpp"
 #include "itr/transfer.hpp"
@@ -348,10 +347,9 @@ template <int Dim>
 std::optional<MeshRenumbering> shape_and_project(const StepTools<Dim>& tools, const StepProblem<Dim>& problem,
                                                  const State<Dim>& before, State<Dim>& state, VectorX& x,
                                                  StepReport& report) {
-  const Shapes shapes = shapes_of<Dim>(tools.setup.nodal_loads);
   AddedMaterial<Dim> added;
   const auto operate = [&](auto&&... all) {
-    RemeshReport operations = put_on_shapes<Dim>(shapes, all..., added);
+    RemeshReport operations = put_on_shapes<Dim>(tools.setup.shapes, all..., added);
     if (added.compressed > 0)
       tools.logger.warning(
           fmt::format("step {}: {} vertices were put onto their shapes where something is in the way: the material there "

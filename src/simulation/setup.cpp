@@ -14,8 +14,8 @@
 
 #include "energy/cavity.hpp"
 #include "energy/mortar.hpp"
-#include "energy/shape_entry.hpp"
 #include "fem/locator.hpp"
+#include "geometry/shape.hpp"
 #include "itr/core.hpp"
 #include "mesh/cell_of_facet.hpp"
 #include "mesh/facet_tags.hpp"
@@ -46,8 +46,7 @@ void require_at_least(const std::string& place, int value, int least) {
 std::string element(const char* list, std::size_t index) { return fmt::format("{}[{}]", list, index); }
 
 void check_time(const TimeOptions& time) {
-  require_positive("/time/dt", time.dt);
-  require(std::isnormal(time.dt * time.dt), "/time/dt", time.dt, "a length of which a double holds the square");
+  require(is_step_length(time.dt), "/time/dt", time.dt, kStepLength);
   require(true, "/time/t0", time.t0, "a number");
   require_at_least("/time/time_steps", time.steps, 1);
   require(time.bdf_order >= 1 && time.bdf_order <= 6, "/time/integrator/steps", time.bdf_order, "1 to 6");
@@ -329,7 +328,8 @@ void check_near(const Setup<Dim>& setup, const Locator<Dim>& locator, const Vec<
                     "a point of a body at rest; the nearest one is " + text(nearest)});
 }
 
-/// Refuses points at places that two connected parts share, of which either may move away, unless ties hold them together.
+/// Refuses points at places that two connected parts share, of which either may move away. Where there are ties,
+/// which may hold them together, nothing is asked.
 template <int Dim>
 void check_points(const Setup<Dim>& setup) {
   constexpr double kRoundOff = 1e-9;
@@ -427,10 +427,9 @@ template <int Dim>
 void check_shapes(const Setup<Dim>& setup) {
   constexpr double kFar = 0.05;  // of the surface's diagonal
   const Mesh<Dim>& mesh = setup.mesh;
-  const auto shapes = shapes_of<Dim>(setup.nodal_loads);
   const std::set<int> kept = tied_or_coupled(setup);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const Shape& shape = *shapes[i];
+  for (std::size_t i = 0; i < setup.shapes.size(); ++i) {
+    const Shape& shape = *setup.shapes[i];
     for (const int tag : shape.surfaces)
       if (kept.contains(tag))
         refuse(fmt::format("/shapes/{}/surface", i), fmt::format("surface {}, which is tied or coupled", tag),

@@ -218,9 +218,7 @@ struct Simulation<Dim>::Impl {
   /// Steps from now on have this length. Returns the state before where its history was cut.
   std::shared_ptr<const State<Dim>> set_step(double dt) {
     TimeOptions& time = setup.time;
-    if (!(dt > 0) || !std::isfinite(dt)) throw InputError({"", "dt", fmt::format("{}", dt), "a number > 0"});
-    if (!std::isnormal(dt * dt))
-      throw InputError({"", "dt", fmt::format("{}", dt), "a length of which a double holds the square"});
+    if (!is_step_length(dt)) throw InputError({"", "dt", fmt::format("{}", dt), kStepLength});
     // A program's clock rounds: a step that differs by no more than that of times is the same.
     if (std::abs(dt - time.dt) <= 8 * std::numeric_limits<double>::epsilon() * (std::abs(state->t) + dt)) return nullptr;
     time.t0 = state->t;

@@ -16,7 +16,6 @@
 #include "core/check.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
-#include "energy/shape_entry.hpp"
 #include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
@@ -415,7 +414,7 @@ class StepSolver {
     else
       renumbering = remesh_and_project(tools_, *first_->problem, first_->state, next_, x_, report_,
                                        remeshing == Remeshing::with_new_curves);
-    if (remeshing != Remeshing::none && !shapes_of<Dim>(setup_.nodal_loads).empty()) take_shapes(renumbering);
+    if (remeshing != Remeshing::none && !setup_.shapes.empty()) take_shapes(renumbering);
     if (!renumbering) {
       problem_ = std::move(first_->problem);
       return std::nullopt;
@@ -438,15 +437,21 @@ class StepSolver {
     if (renumbering) settle_chords();
     const State<Dim> unchanged = next_;
     const VectorX solution = x_;
-    StepProblem<Dim> problem(setup_, unchanged.mesh, unchanged.history, unchanged.t, tools_.cache, unchanged.stiffness,
-                             unchanged.quadrature, unchanged.chords);
+    std::optional<StepProblem<Dim>> problem;
+    const auto make = [&] {
+      problem.emplace(setup_, unchanged.mesh, unchanged.history, unchanged.t, tools_.cache, unchanged.stiffness,
+                      unchanged.quadrature, unchanged.chords);
+    };
+    if (renumbering) make();
     StepReport effort;
     effort.energy = report_.energy;
-    const auto again = shape_and_project(tools_, problem, unchanged, next_, x_, effort);
+    const auto again = shape_and_project(tools_, problem ? *problem : *first_->problem, unchanged, next_, x_, effort);
     if (again) {
+      if (!problem) make();
+      const double before = problem->report(solution).total;
       settle_chords();
       make_problem();
-      effort.shape_energy = problem_->report(x_).total - problem.report(solution).total;
+      effort.shape_energy = problem_->report(x_).total - before;
       renumbering = renumbering ? compose(*renumbering, *again) : *again;
     }
     report_.add_effort(effort);

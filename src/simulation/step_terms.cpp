@@ -9,7 +9,6 @@
 #include <limits>
 #include <utility>
 
-#include "energy/shape_entry.hpp"
 #include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "itr/core.hpp"
@@ -163,8 +162,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
     if (viscous && viscous->acts_on(body)) material.deviator *= viscous->factor(body);
   std::vector<TermFactory<Dim>> host = setup.terms;
   std::ranges::copy_if(setup.nodal_loads, std::back_inserter(host), [](const TermFactory<Dim>& load) {
-    // Terms of coupled points are StepProblem's, and a shape has none.
-    return !load.template target<CouplingEntry<Dim>>() && !load.template target<ShapeEntry<Dim>>();
+    return load.template target<CouplingEntry<Dim>>() == nullptr;  // whose terms StepProblem makes
   });
   return {.materials = std::move(materials),
           .viscous = viscous,

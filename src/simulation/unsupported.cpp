@@ -6,7 +6,7 @@
 
 #include "energy/elastic/law_table.hpp"
 #include "energy/rigid_body.hpp"
-#include "energy/shape_entry.hpp"
+#include "energy/support.hpp"
 #include "itr/core.hpp"
 
 namespace itr {
@@ -181,7 +181,7 @@ constexpr Check<Dim> kChecks[] = {
      }},
     {{"/shapes", "shapes where bodies are viscoelastic: their state has none for new material"},
      [](const Setup<Dim>& setup, bool) {
-       return setup.remesh.enabled && !shapes_of<Dim>(setup.nodal_loads).empty() &&
+       return setup.remesh.enabled && !setup.shapes.empty() &&
               std::ranges::any_of(setup.materials, [](const auto& e) { return !e.second.prony.empty(); });
      }},
     {{"/materials", "a density that varies in space where the mesh changes"},

@@ -3,6 +3,7 @@
 // from new positions (docs/theory.md, "Time").
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct History {
   bool damp_next = false;
   std::shared_ptr<const ViscousHistory> viscous{};  ///< null: no body is viscoelastic
 };
+
+/// Requirement on the length of a step, whose square enters energies; and whether a number meets it.
+inline constexpr const char* kStepLength = "a number > 0 of which a double holds the square";
+inline bool is_step_length(double dt) { return dt > 0 && std::isnormal(dt * dt); }
 
 /// The error in time that one step adds.
 struct LocalError {

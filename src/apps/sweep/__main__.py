@@ -94,7 +94,7 @@ def command_of(itr, options, folder, values):
 
 
 def check(itr, options, runs):
-    """Refuses a sweep of which the command refuses a run: a key that is none would else show after the sweep."""
+    """Refuses what the command refuses of these runs: a key that is none would else show after the sweep."""
     for values in runs:
         settings = [*(f"{pointer}={json.dumps(value)}" for pointer, value in values.items()), *options.set]
         words = [word for text in settings for word in ("--set", text)]
@@ -128,7 +128,7 @@ def plan(itr, options):
     known = folder / "sweep.json"
     if known.exists() and json.loads(known.read_text()) != described:
         fail(f"{known}: another sweep; expected another folder (-o), or the same scene and values to go on")
-    check(itr, options, (runs[0], runs[-1]))
+    check(itr, options, runs[:1] + runs[1:][-1:])
     folder.mkdir(parents=True, exist_ok=True)
     lines = [command_of(itr, options, folder / "runs" / name, values) for name, values in zip(names_of(runs), runs)]
     write_whole(known, json.dumps(described, indent=1) + "\n")

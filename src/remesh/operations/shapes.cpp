@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numbers>
 
 #include "geometry/shape.hpp"
@@ -25,24 +26,22 @@ Vec<3> in_space(const Vec<Dim>& p) {
   return point;
 }
 
+using ShapeOfTag = std::map<int, const Shape*>;
+
 /// Surfaces that a place has to lie on: shapes, and planes where there are none.
 template <int Dim>
 class Carriers {
  public:
   /// Takes those of the boundary facets at an edge, or at a vertex (both ends the same).
-  Carriers(const Mesh<Dim>& mesh, const Shapes& shapes, const EdgeKey& edge) {
+  Carriers(const Mesh<Dim>& mesh, const ShapeOfTag& shapes, const EdgeKey& edge) {
     for (const FacetId f : mesh.facets_of(edge[0])) {
       if (!holds(mesh.facet(f), edge[1])) continue;
-      const auto shape = std::ranges::find_if(shapes, [&](const auto& candidate) {
-        return std::ranges::find(candidate->surfaces, mesh.facet_tag(f)) != candidate->surfaces.end();
-      });
-      if (shape != shapes.end())
-        add(**shape);
+      if (const auto shape = shapes.find(mesh.facet_tag(f)); shape != shapes.end())
+        add(*shape->second);
       else
         add_plane(mesh, f);
     }
   }
-  bool has_shape() const { return !shapes_.empty(); }
   /// How far an edge on them that may touch may be off [m].
   double most_sag(double otherwise) const {
     double most = std::numeric_limits<double>::infinity();
@@ -112,24 +111,23 @@ class ShapeOperation {
   ShapeOperation(RemeshSession<Dim>& session, const Shapes& shapes, const RemeshFields<Dim>& fields,
                  AddedMaterial<Dim>& added)
       : session_(session),
-        shapes_(shapes),
         queries_(session.queries()),
         mesh_(queries_.mesh()),
         fields_(fields),
         added_(added),
         tolerance_(kTolerance * (rest_box(mesh_).diagonal() + rest_box(mesh_).center().cwiseAbs()).norm()),
-        motion_of_obstacles_(largest_motion(queries_.context().obstacles)) {}
+        motion_of_obstacles_(largest_motion(queries_.context().obstacles)) {
+    for (const auto& shape : shapes)
+      for (const int tag : shape->surfaces) shape_of_.emplace(tag, shape.get());
+  }
 
   void run() {
     constexpr int kMostRounds = 12;
-    std::vector<VertexId> vertices;
-    for (const VertexId v : mesh_.live_vertices())
-      if (mesh_.is_boundary(v)) vertices.push_back(v);
-    for (const VertexId v : vertices) put_on_shape(v);
-    std::vector<EdgeKey> edges = surface_edges();
+    for (const VertexId v : shaped_vertices()) put_on_shape(v);
+    std::vector<EdgeKey> edges = shaped_edges();
     for (int round = 0; round < kMostRounds && !edges.empty(); ++round) edges = split(edges);
-    for (const VertexId v : mesh_.live_vertices())
-      if (mesh_.is_boundary(v) && !stays(v)) note_if_off(v);
+    for (const VertexId v : shaped_vertices())
+      if (!stays(v)) note_if_off(v);
   }
 
  private:
@@ -139,6 +137,13 @@ class ShapeOperation {
   static constexpr double kMostTurn = 2 * std::numbers::pi / (Dim == 2 ? 96 : 32);
   static constexpr double kWorthMoving = 10;  ///< tolerances from which on it is moved
 
+  bool has_shape(FacetId f) const { return shape_of_.contains(mesh_.facet_tag(f)); }
+  std::vector<VertexId> shaped_vertices() const {
+    std::vector<VertexId> vertices;
+    for (const VertexId v : mesh_.live_vertices())
+      if (std::ranges::any_of(mesh_.facets_of(v), [&](FacetId f) { return has_shape(f); })) vertices.push_back(v);
+    return vertices;
+  }
   bool is_kept(FacetId f) const {
     const auto& kept = queries_.context().kept_surfaces;
     return std::ranges::find(kept, mesh_.facet_tag(f)) != kept.end();
@@ -149,17 +154,15 @@ class ShapeOperation {
   }
 
   void note_if_off(VertexId v) {
-    const Carriers<Dim> carriers(mesh_, shapes_, {v, v});
-    if (!carriers.has_shape()) return;
-    const double distance = carriers.distance(mesh_.rest(v));
+    const double distance = Carriers<Dim>(mesh_, shape_of_, {v, v}).distance(mesh_.rest(v));
     if (distance <= kWorthMoving * tolerance_) return;
     ++added_.off;
     added_.farthest = std::max(added_.farthest, distance);
   }
 
   void put_on_shape(VertexId v) {
-    const Carriers<Dim> carriers(mesh_, shapes_, {v, v});
-    if (!carriers.has_shape() || carriers.distance(mesh_.rest(v)) <= kWorthMoving * tolerance_ || stays(v)) return;
+    const Carriers<Dim> carriers(mesh_, shape_of_, {v, v});
+    if (carriers.distance(mesh_.rest(v)) <= kWorthMoving * tolerance_ || stays(v)) return;
     const auto place = carriers.nearest(mesh_.rest(v), tolerance_);
     if (!place) return session_.report().smooths.note(Refusal::held);
     for (const CellId c : mesh_.cells_of(v))
@@ -271,9 +274,10 @@ class ShapeOperation {
     added_.moved.push_back(v);
   }
 
-  std::vector<EdgeKey> surface_edges() const {
+  std::vector<EdgeKey> shaped_edges() const {
     std::vector<EdgeKey> edges;
     for (const FacetId f : mesh_.live_facets()) {
+      if (!has_shape(f)) continue;
       const auto& facet = mesh_.facet(f);
       for (int k = 0; k < (Dim == 2 ? 1 : 3); ++k) edges.push_back(edge_key(facet[k], facet[(k + 1) % Dim]));
     }
@@ -285,20 +289,19 @@ class ShapeOperation {
   /// How far the middle of an edge of a surface is off its shape [m]; 0 where that may stay: the edge is short beside the
   /// radius of the shape, and contact sees nothing of it.
   double sag_to_mend(const EdgeKey& edge) {
-    const Carriers<Dim> carriers(mesh_, shapes_, edge);
-    if (!carriers.has_shape()) return 0;
+    const auto both = [&](auto&& holds) { return holds(edge[0]) && holds(edge[1]); };
+    if (both([&](VertexId v) { return mesh_.is_on_axis(v); }) ||
+        both([&](VertexId v) { return mesh_.is_on_interface(v); }) ||
+        std::ranges::any_of(mesh_.facets_of_edge(edge), [&](FacetId f) { return is_kept(f); }))
+      return 0;
+    const Carriers<Dim> carriers(mesh_, shape_of_, edge);
     for (const VertexId v : edge)  // halves would be no nearer to the shape
       if (carriers.distance(mesh_.rest(v)) > kWorthMoving * tolerance_) return 0;
     const double sag = carriers.distance((mesh_.rest(edge[0]) + mesh_.rest(edge[1])) / 2);
     const bool is_coarse = sag > kMostTurn / 8 * (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).norm();
-    if (!is_coarse && !(queries_.has_contact() && sag > carriers.most_sag(kMostOverhang * queries_.context().contact.dhat) &&
-                        may_touch(edge, sag)))
-      return 0;
-    const auto both = [&](auto&& holds) { return holds(edge[0]) && holds(edge[1]); };
-    const bool is_fixed = both([&](VertexId v) { return mesh_.is_on_axis(v); }) ||
-                          both([&](VertexId v) { return mesh_.is_on_interface(v); }) ||
-                          std::ranges::any_of(mesh_.facets_of_edge(edge), [&](FacetId f) { return is_kept(f); });
-    return is_fixed ? 0 : sag;
+    const bool is_seen = queries_.has_contact() &&
+                         sag > carriers.most_sag(kMostOverhang * queries_.context().contact.dhat) && may_touch(edge, sag);
+    return is_coarse || is_seen ? sag : 0;
   }
 
   /// Splits the edges that are too far off their shapes, those farthest off first, and returns the new ones.
@@ -367,7 +370,7 @@ class ShapeOperation {
   }
 
   RemeshSession<Dim>& session_;
-  const Shapes& shapes_;
+  ShapeOfTag shape_of_;
   const RemeshQueries<Dim>& queries_;
   const Mesh<Dim>& mesh_;
   const RemeshFields<Dim>& fields_;
