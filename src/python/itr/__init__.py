@@ -201,7 +201,7 @@ class Simulation:
 
     def _do(self, step: Callable[[float], tuple], dt: Optional[float]) -> None:
         if dt is not None and not dt > 0:
-            raise InputError(f"dt: found {dt:g}; expected a number > 0")
+            raise InputError(f"dt: found {dt:g}; expected a number > 0 of which a double holds the square")
         t = self.time + (self._simulation.step_length if dt is None else dt)
         for sample in self._functions.values():
             sample(t)
