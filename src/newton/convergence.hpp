@@ -19,7 +19,7 @@ class Convergence {
     const NewtonOptions& options = task_.options;
     const double now = at_.gradient_norm();
     if (first_gradient_ < 0) first_gradient_ = now;
-    if (now <= std::max(force_asked(), kVanishing)) return true;
+    if (now <= std::max(force_asked(), kVanishing)) return !turns_aside(now);
     if (!is_first()) return now < options.gradient_tolerance || now < options.relative_gradient_tolerance * first_gradient_;
     if (begins_elsewhere() && now > kNothing * task_.norms.of_gradient(task_.extras.gradient_of_step)) return false;
     return now < options.first_gradient_tolerance;
@@ -78,6 +78,7 @@ class Convergence {
 
  private:
   static constexpr double kNothing = 1e-10;       ///< see NewtonExtras::step_to_start
+  static constexpr double kAside = 1e-5;          ///< see NewtonExtras::add_inertia_of_motion
   static constexpr double kVanishing = 1e-140;    ///< squares of smaller numbers are no numbers any more
   static constexpr double kFloor = 8;             ///< times the round-off of the gradient: no step can be told to improve it
   static constexpr double kFarAbove = 1e4;        ///< the same: a larger residual is an error, not round-off
@@ -96,6 +97,17 @@ class Convergence {
   }
   bool is_first() const { return task_.summary.iterations == 0; }
   bool begins_elsewhere() const { return task_.extras.step_to_start.size() > 0; }
+  /// Whether inertia feels the forces that are left, small as they are; a solve goes on for this once.
+  bool turns_aside(double residual) {
+    if (!task_.extras.add_inertia_of_motion || residual <= kVanishing) return false;
+    if (turns_aside_at_ != kNone) return turns_aside_at_ == at_.revision();
+    VectorX inertia = VectorX::Zero(at_.x().size());
+    task_.extras.add_inertia_of_motion(at_.x(), inertia);
+    const double felt = task_.norms.of_gradient(inertia);
+    if (residual <= kAside * felt || !(felt > 0)) return false;
+    turns_aside_at_ = at_.revision();
+    return true;
+  }
   bool has_small_step(const Step& step) {
     const NewtonOptions& options = task_.options;
     if (first_step_ < 0) first_step_ = step.norm;
@@ -118,7 +130,7 @@ class Convergence {
     const double now = at_.gradient_norm();
     still_ = unresolved_ > 1 && now > kShrunk * last_shrunk_ ? still_ + 1 : 0;
     if (still_ == 0) last_shrunk_ = now;
-    const bool is_worth_a_try = !is_below_energy || (is_first() && seen && !is_hidden);
+    const bool is_worth_a_try = !is_below_energy || turns_aside_at_ == at_.revision() || (is_first() && seen && !is_hidden);
     return (!is_worth_a_try && now <= kFloor * at_.gradient_round_off()) || still_ >= kMostStill ||
            unresolved_ >= kMostUnresolved;
   }
@@ -140,6 +152,7 @@ class Convergence {
   int still_ = 0;           ///< of these, those since
   int creeping_ = 0;        ///< steps in a row that promised hardly more than the energy resolves
   int stalled_ = 0;
+  int turns_aside_at_ = kNone;  ///< the revision of x at which the solve has gone on for it
 };
 
 }  // namespace itr

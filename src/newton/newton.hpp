@@ -176,6 +176,9 @@ struct NewtonExtras {
   /// The solve has not converged there unless gradient and step are nothing beside these: whatever the tolerances, forces
   /// that just began to act are not passed over. Empty: it begins where the state is.
   VectorX step_to_start{}, gradient_of_step{};
+  /// Adds to a gradient what inertia does along the motion from the start of the step to x. Forces that are left beside it,
+  /// however small beside those that act, turn free bodies aside: one more step is taken then. Empty: nothing has inertia.
+  std::function<void(ConstVectorView x, VectorView gradient)> add_inertia_of_motion{};
   /// Where x are increments, the round-off of positions. A first step that is far above it is taken, whatever the
   /// gradient's round-off; steps in a row that are not may end the solve, whatever they promise of the energy.
   std::optional<double> position_round_off{};

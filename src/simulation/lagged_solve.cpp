@@ -294,6 +294,10 @@ class LaggedSolve {
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
       extras.step_to_start = std::move(step_to_start);
     }
+    if (terms_.has_inertia && !rigid_)
+      extras.add_inertia_of_motion = [this](ConstVectorView d, VectorView gradient) {
+        potential_.inertia()->add_mass_product(d, gradient);
+      };
     if (cells_.has_curved()) {
       potential_.elastic()->refine_quadrature(x);
       extras.after_step = [&](const VectorX& d) { return potential_.elastic()->refine_quadrature(base_ + d); };
