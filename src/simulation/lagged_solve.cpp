@@ -48,7 +48,7 @@ constexpr int kPlainRounds = 10;               ///< after which rounds are relax
 constexpr double kLooseByChange = 0.1;         ///< of what lagged forces change by: to which the next one is
 
 constexpr double kDigits = 1e-3;  ///< of the tolerance: to which rounds of bodies that land go on while they gain,
-constexpr double kGain = 0.8;     ///< to this part of the residual before, so that all solvers end alike
+constexpr int kIdleRounds = 3;    ///< until so many in a row did not, so that all solvers end alike
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
 constexpr auto is_friction = [](const auto& term) { return term.kind == TermKind::friction; };
@@ -96,7 +96,6 @@ class LaggedSolve {
     BarrierStiffness best_stiffness = stiffness_;
     bool is_best_loose = loose_force_ > 0;
     double least = std::numeric_limits<double>::infinity();
-    double last_residual = std::numeric_limits<double>::infinity();
     int best_round = 0, round = 1;
     RoundsEnd end = rounds > 1 ? RoundsEnd::most : RoundsEnd::asked;
     std::optional<Lagged> now;  // what is lagged at x, where the last round made it
@@ -123,9 +122,8 @@ class LaggedSolve {
         if (setup_.lagging_tolerance > 0) {
           residual = largest_change(x, next_lagged);
           const bool gains_digits =
-              has_landed_ && residual > kDigits * setup_.lagging_tolerance && residual < kGain * last_residual;
+              has_landed_ && residual > kDigits * setup_.lagging_tolerance && round - best_round <= kIdleRounds;
           is_settled = residual <= setup_.lagging_tolerance && loose_force_ == 0 && !gains_digits;
-          last_residual = residual;
           if (round > kPlainRounds && lagged_.friction && next_lagged.friction)
             factor = relaxation.factor(residual_of_lagging(x, next_lagged));
         } else {
