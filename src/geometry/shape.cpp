@@ -90,25 +90,25 @@ ShapeOffset offset_from(const Shape& shape, const Vec<3>& point) {
 std::shared_ptr<const FittedSurface> fit_curves(const std::vector<std::array<Vec<3>, 2>>& segments, double feature_angle) {
   using Key = std::array<double, 3>;
   const auto key = [](const Vec<3>& p) { return Key{p[0], p[1], p[2]}; };
-  std::map<Key, std::vector<std::size_t>> from, to;  // segments by their ends
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    from[key(segments[i][0])].push_back(i);
-    to[key(segments[i][1])].push_back(i);
+  std::map<Key, std::vector<Vec<3>>> to_next;  // from a place to the other ends of its segments
+  for (const auto& [a, b] : segments) {
+    to_next[key(a)].emplace_back(b - a);
+    to_next[key(b)].emplace_back(a - b);
   }
   const auto along = [&](std::size_t i) { return Vec<3>(segments[i][1] - segments[i][0]); };
-  /// Tangent at a smooth place; 0 at corners.
-  const auto tangent_at = [&](const Vec<3>& place) {
-    const auto before = to.find(key(place)), after = from.find(key(place));
-    if (before == to.end() || after == from.end() || before->second.size() != 1 || after->second.size() != 1)
-      return Vec<3>(Vec<3>::Zero());
-    const Vec<3> a = along(before->second[0]), b = along(after->second[0]);
+  /// Tangent at a smooth place in the direction of a segment that ends there; 0 at corners.
+  const auto tangent_at = [&](const Vec<3>& place, const Vec<3>& segment) {
+    const std::vector<Vec<3>>& next = to_next.at(key(place));
+    if (next.size() != 2) return Vec<3>(Vec<3>::Zero());
+    const Vec<3> a = -next[0], b = next[1];
     if (std::atan2(a.cross(b).norm(), a.dot(b)) > feature_angle) return Vec<3>(Vec<3>::Zero());
-    return Vec<3>((a / a.squaredNorm() + b / b.squaredNorm()).normalized());
+    const Vec<3> tangent = (a / a.squaredNorm() + b / b.squaredNorm()).normalized();
+    return Vec<3>(tangent.dot(segment) < 0 ? -tangent : tangent);
   };
   auto fitted = std::make_shared<FittedSurface>();
   for (std::size_t i = 0; i < segments.size(); ++i) {
     const Vec<3> chord = along(i), direction = chord.normalized();
-    std::array<Vec<3>, 2> tangents{tangent_at(segments[i][0]), tangent_at(segments[i][1])};
+    std::array<Vec<3>, 2> tangents{tangent_at(segments[i][0], chord), tangent_at(segments[i][1], chord)};
     for (int end = 0; end < 2; ++end) {
       if (tangents[end] != Vec<3>::Zero()) continue;
       const Vec<3>& other = tangents[1 - end];  // an arc has it mirrored

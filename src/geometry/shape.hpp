@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "itr/types.hpp"
@@ -26,6 +27,13 @@ struct Shape {
   std::shared_ptr<const FittedSurface> fitted{};  ///< by Setup::choose_defaults
 };
 
+/// The angle by which a shape may turn along an edge of a mesh on it [rad].
+template <int Dim>
+constexpr double kMostTurn = 2 * std::numbers::pi / (Dim == 2 ? 96 : 32);
+/// How far the middle of an edge is off a shape that turns so far along it, by the length of the edge.
+template <int Dim>
+constexpr double kMostSag = kMostTurn<Dim> / 8;
+
 /// The point less `distance` times `normal` lies on the shape, nearest to the point.
 struct ShapeOffset {
   double distance;  ///< signed: positive on the side that `normal` points to [m]
@@ -38,7 +46,7 @@ struct FittedSurface {
   std::vector<std::array<Vec<3>, 4>> curves;  ///< points of control
 };
 
-/// Fits curves through the ends of segments, in any order, each from its first end to its second. Where segments meet under
+/// Fits curves through the ends of segments, in any order and direction. Where segments meet under
 /// more than `feature_angle` [rad], or not two of them do, stays a corner. Tangents elsewhere are those of the circle
 /// through a place and its neighbours, so that polygons in circles get arcs up to the fourth power of their angles.
 std::shared_ptr<const FittedSurface> fit_curves(const std::vector<std::array<Vec<3>, 2>>& segments, double feature_angle);

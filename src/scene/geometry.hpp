@@ -12,6 +12,8 @@
 
 namespace itr::scene {
 
+struct ShapeEntry;
+
 /// Mesh files by path, each read once: a scene may name one file many times.
 class MeshFiles {
  public:
@@ -54,6 +56,8 @@ Mesh<Dim> read_bodies(const Node& root, const Geometries& geometries, MeshFiles&
 
 /// The label of an obstacle: its `surface_selection`, else its name.
 std::optional<Label> read_obstacle_label(const Node& geometry);
+/// The id of an obstacle; kNoTag if it has no label.
+int read_obstacle_id(const Node& geometry, const Sets& sets);
 
 template <int Dim>
 struct ObstacleGeometry {
@@ -62,9 +66,11 @@ struct ObstacleGeometry {
   std::vector<int> part{};   ///< per vertex: which of Geometries::obstacles; empty where a program brings them
 };
 
+/// Obstacles with a shape are refined on it.
 template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
-                                     const Sets& sets, std::vector<std::string>& warnings);
+                                     const Sets& sets, const std::vector<ShapeEntry>& shapes,
+                                     std::vector<std::string>& warnings);
 
 /// The surface of the file that `holder` names as `mesh`, moved by the transformation of `geometry`. All points of the file
 /// are its vertices, in their order.

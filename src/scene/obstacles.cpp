@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Obstacles: collision-only surfaces out of mesh files (docs/theory.md, "Meshes").
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
+#include "shapes.hpp"
 #include "transformation.hpp"
 
 namespace itr::scene {
@@ -141,9 +145,140 @@ void check_lengths(const Node& mesh, const Surface& surface, const std::vector<V
                 "no degenerate surfaces");
 }
 
-int read_obstacle_id(const Node& geometry, const Sets& sets) {
-  const std::optional<Label> label = read_obstacle_label(geometry);
-  return label && !sets.surfaces.of(*label).empty() ? sets.surfaces.of(*label).front() : kNoTag;
+Vec<3> in_space(const Vec<2>& p) { return {p[0], p[1], 0}; }
+const Vec<3>& in_space(const Vec<3>& p) { return p; }
+
+std::vector<SurfaceTriangle> triangles_of(const Surface& surface, const std::vector<Vec<2>>& points) {
+  std::vector<SurfaceTriangle> triangles;
+  for (const auto& [a, b] : surface.edges) std::ranges::copy(raised(points[a], points[b]), std::back_inserter(triangles));
+  return triangles;
+}
+std::vector<SurfaceTriangle> triangles_of(const Surface& surface, const std::vector<Vec<3>>& points) {
+  std::vector<SurfaceTriangle> triangles;
+  for (const auto& [a, b, c] : surface.triangles) triangles.push_back({points[a], points[b], points[c]});
+  return triangles;
+}
+
+/// Puts a surface onto a shape and cuts its edges in two until the shape turns along none by more than kMostTurn, and no
+/// middle is farther off it than the sag that the scene gives.
+template <int Dim>
+class ShapedSurface {
+ public:
+  ShapedSurface(const ShapeEntry& entry, Surface& surface, std::vector<Vec<Dim>>& points)
+      : entry_(entry), surface_(surface), points_(points), shape_(shape_through<Dim>(entry, triangles_of(surface, points))) {
+    if (shape_.kind != Shape::Kind::fitted) return;
+    std::vector<std::array<Vec<3>, 2>> segments;
+    for (const auto& [a, b] : surface.edges) segments.push_back({in_space(points[a]), in_space(points[b])});
+    shape_.fitted = fit_curves(segments, shape_.angle);
+  }
+
+  void refine() {
+    constexpr int kMostRounds = 16;
+    constexpr std::size_t kMostEdges = 2'000'000;
+    check_distance();
+    for (std::size_t v = 0; v < points_.size(); ++v)
+      if (surface_.is_used[v]) put_on(points_[v]);
+    for (int round = 0; round < kMostRounds && mark(); ++round) {
+      cut();
+      if (surface_.edges.size() > kMostEdges)
+        entry_.node["sag"].fail(fmt::format("an obstacle of more than {} edges on its shape", kMostEdges), "a larger sag");
+    }
+  }
+
+ private:
+  void check_distance() const {
+    constexpr double kFar = 0.05;  // of the diagonal, as surfaces of bodies
+    Eigen::AlignedBox<double, Dim> box;
+    double farthest = 0;
+    for (const Edge& edge : surface_.edges)
+      for (const int v : edge) {
+        box.extend(points_[v]);
+        farthest = std::max(farthest, std::abs(offset_from(shape_, in_space(points_[v])).distance));
+      }
+    if (farthest > kFar * box.diagonal().norm())
+      entry_.node.fail(fmt::format("a geometry that a vertex of its obstacle is {} off",
+                                   entry_.node.document().units.text(farthest, "m", 3)),
+                       "one that all vertices of the obstacle lie on");
+  }
+  /// Moves a point to the nearest place of the shape: one step is exact but at curves.
+  void put_on(Vec<Dim>& point) const {
+    for (int i = 0; i < 2; ++i) {
+      const ShapeOffset offset = offset_from(shape_, in_space(point));
+      point -= offset.distance * offset.normal.template head<Dim>();
+    }
+  }
+  bool is_coarse(const Edge& edge) const {
+    const Vec<Dim>&a = points_[edge[0]], &b = points_[edge[1]];
+    const double sag = std::abs(offset_from(shape_, in_space(Vec<Dim>((a + b) / 2))).distance);
+    return sag > kMostSag<Dim> * (b - a).norm() || (shape_.sag > 0 && sag > shape_.sag);
+  }
+  /// Makes the middles of coarse edges; whether there are any.
+  bool mark() {
+    middles_.clear();
+    for (const Edge& edge : surface_.edges) {
+      if (!is_coarse(edge)) continue;
+      middles_.emplace(sorted(edge), static_cast<int>(points_.size()));
+      points_.push_back((points_[edge[0]] + points_[edge[1]]) / 2);
+      put_on(points_.back());
+    }
+    surface_.is_used.resize(points_.size(), true);
+    return !middles_.empty();
+  }
+  int middle_of(int a, int b) const {
+    const auto found = middles_.find(sorted(Edge{a, b}));
+    return found == middles_.end() ? kNone : found->second;
+  }
+  void cut() {
+    EdgeList edges;
+    for (const auto& [a, b] : surface_.edges) {
+      const int middle = middle_of(a, b);
+      if (middle == kNone) {
+        edges.add({a, b});
+      } else {
+        edges.add({a, middle});
+        edges.add({middle, b});
+      }
+    }
+    std::vector<Triangle> triangles;
+    for (const Triangle& triangle : surface_.triangles) bisect(triangle, triangles);
+    for (const Triangle& t : triangles)
+      for (const Edge& edge : {Edge{t[0], t[1]}, Edge{t[1], t[2]}, Edge{t[2], t[0]}}) edges.add(edge);
+    surface_.edges = edges.take();
+    surface_.triangles = std::move(triangles);
+  }
+  /// Cuts the longest edge that has a middle, then those of both halves.
+  void bisect(const Triangle& triangle, std::vector<Triangle>& made) const {
+    int longest = kNone;
+    double most = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int a = triangle[k], b = triangle[(k + 1) % 3];
+      const double length = (points_[a] - points_[b]).norm();
+      if (middle_of(a, b) == kNone || !(length > most)) continue;
+      longest = k;
+      most = length;
+    }
+    if (longest == kNone) {
+      made.push_back(triangle);
+      return;
+    }
+    const int a = triangle[longest], b = triangle[(longest + 1) % 3], c = triangle[(longest + 2) % 3];
+    bisect({a, middle_of(a, b), c}, made);
+    bisect({middle_of(a, b), b, c}, made);
+  }
+
+  const ShapeEntry& entry_;
+  Surface& surface_;
+  std::vector<Vec<Dim>>& points_;
+  Shape shape_;
+  std::map<Edge, int> middles_;  ///< by edge
+};
+
+/// Refines an obstacle on its shape, if it has one.
+template <int Dim>
+void put_onto(const std::vector<ShapeEntry>& shapes, int id, Surface& surface, std::vector<Vec<Dim>>& points) {
+  for (const ShapeEntry& entry : shapes)
+    if (std::ranges::find(entry.shape.surfaces, id) != entry.shape.surfaces.end())
+      ShapedSurface<Dim>(entry, surface, points).refine();
 }
 
 template <int Dim>
@@ -163,7 +298,8 @@ void append(const Surface& surface, const std::vector<Vec<Dim>>& points, const V
 }
 
 template <int Dim>
-void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets, ObstacleGeometry<Dim>& out) {
+void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets, const std::vector<ShapeEntry>& shapes,
+                   ObstacleGeometry<Dim>& out) {
   if (Dim == 2 && !is_flat(file))
     geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + ", a surface in space, where no body has tetrahedra (2D)",
                           "a line or a flat mesh");
@@ -178,6 +314,7 @@ void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets,
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();
   check_lengths<Dim>(geometry["mesh"], surface, points);
   const int id = read_obstacle_id(geometry, sets);
+  if (id != kNoTag && extract < 2) put_onto<Dim>(shapes, id, surface, points);
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
 }
 
@@ -226,14 +363,15 @@ void read_flat(const Node& geometry, const Box<Dim>& bodies, const Sets& sets, O
 
 template <int Dim>
 ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& files, const Mesh<Dim>& bodies,
-                                     const Sets& sets, std::vector<std::string>& warnings) {
+                                     const Sets& sets, const std::vector<ShapeEntry>& shapes,
+                                     std::vector<std::string>& warnings) {
   ObstacleGeometry<Dim> all;
   for (const Node& geometry : geometries.obstacles) {
     const int part = all.part.empty() ? 0 : all.part.back() + 1;
     if (is_flat_obstacle(geometry))
       read_flat<Dim>(geometry, rest_box(bodies), sets, all);
     else
-      read_obstacle<Dim>(geometry, files.get(geometry), sets, all);
+      read_obstacle<Dim>(geometry, files.get(geometry), sets, shapes, all);
     all.part.resize(all.obstacles.rest.size(), part);
   }
   files.take_notes(warnings);
@@ -248,6 +386,11 @@ std::optional<Label> read_obstacle_label(const Node& geometry) {
   }
   if (!node.json().is_number() && !node.json().is_string()) node.fail("a number or a name: an obstacle has one id");
   return read_label(node, 0);
+}
+
+int read_obstacle_id(const Node& geometry, const Sets& sets) {
+  const std::optional<Label> label = read_obstacle_label(geometry);
+  return label && !sets.surfaces.of(*label).empty() ? sets.surfaces.of(*label).front() : kNoTag;
 }
 
 template <int Dim>
@@ -265,7 +408,7 @@ Obstacles<Dim> read_surface(const Node& holder, const Node& geometry, MeshFiles&
 #define ITR_INSTANTIATE(Dim)                                                                                  \
   template Obstacles<Dim> read_surface(const Node&, const Node&, MeshFiles&);                                 \
   template ObstacleGeometry<Dim> read_obstacles(const Geometries&, MeshFiles&, const Mesh<Dim>&, const Sets&, \
-                                                std::vector<std::string>&);
+                                                const std::vector<ShapeEntry>&, std::vector<std::string>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

@@ -88,8 +88,8 @@ void read_axisymmetric(const Node& root, Mesh<Dim>& mesh) {
 
 /// All but geometry and the contact that comes with it.
 template <int Dim>
-void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstacles, Setup<Dim>& setup,
-                std::vector<std::string>& warnings) {
+void read_model(const Node& root, const Sets& sets, const std::vector<ShapeEntry>& shapes, ObstacleGeometry<Dim> obstacles,
+                Setup<Dim>& setup, std::vector<std::string>& warnings) {
   setup.time = read_time(root, warnings);
   setup.remesh = read_remesh(root);
   setup.linear = read_linear(root);
@@ -108,7 +108,7 @@ void read_model(const Node& root, const Sets& sets, ObstacleGeometry<Dim> obstac
   read_preset_problem<Dim>(root, sets.bodies, setup);
   setup.ties = read_ties<Dim>(root, sets, setup.mesh, setup.time);
   read_supports<Dim>(root, sets, setup);
-  read_shapes<Dim>(root, sets, setup);
+  add_shapes<Dim>(shapes, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
 }
 
@@ -145,10 +145,14 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
       for (const char* key : {"translation", "dimensions", "scale"})
         warn_of_components(geometry["transformation"][key], Dim, warnings, true);
     }
-  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, sets, warnings);
+  std::set<int> surfaces = sets.facet_tags(setup.mesh);
+  for (const Node& geometry : geometries.obstacles)
+    if (const int id = read_obstacle_id(geometry, sets); id != kNoTag) surfaces.insert(id);
+  const std::vector<ShapeEntry> shapes = read_shapes<Dim>(root, sets, surfaces);
+  ObstacleGeometry<Dim> obstacles = read_obstacles<Dim>(geometries, files, setup.mesh, sets, shapes, warnings);
   parts = name_parts<Dim>(geometries, obstacles, sets);
   std::vector<ForceTarget> curves = read_forces<Dim>(root, parts, sets, setup.mesh);
-  read_model<Dim>(root, sets, std::move(obstacles), setup, warnings);
+  read_model<Dim>(root, sets, shapes, std::move(obstacles), setup, warnings);
   add_named_curves(root, setup, curves);
   setup.fields.curves = std::move(curves);
   setup.fields.points = read_points<Dim>(root);
@@ -290,7 +294,8 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
   setup.mesh = std::move(geometry.mesh);
   read_axisymmetric(root, setup.mesh);
   geometry.obstacles.motion.assign(geometry.obstacles.rest.size(), kNone);
-  read_model<Dim>(root, sets, {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
+  read_model<Dim>(root, sets, read_shapes<Dim>(root, sets, sets.facet_tags(setup.mesh)),
+                  {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   return setup;
 }

@@ -5,18 +5,20 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 #include <numbers>
 #include <set>
 #include <string_view>
 #include <vector>
 
-#include "geometry/shape.hpp"
+#include "mesh/rest_box.hpp"
 #include "supports.hpp"
 
 namespace itr::scene {
 
 namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
 
 /// Reads a point or a direction; what a 2D scene leaves out is 0.
 Vec<3> read_vector_of(const Node& node, int dim, const Vec<3>& fallback) {
@@ -50,33 +52,28 @@ const Type& read_type(const Node& node, int dim) {
   using enum Shape::Kind;
   if (dim == 2 && (type.kind == cylinder || type.kind == cone || type.kind == torus))
     node["type"].fail(found, "plane, circle or fitted");
-  if (dim == 3 && type.kind == fitted) node["type"].fail(found, "a geometry: fitted is for 2D");
   if (dim == 3 && type.name == "circle") node["type"].fail(found, "sphere");
   return type;
 }
 
-/// Refuses a shape without a key of its type, and one with a key of other types.
-void check_keys(const Node& node, const Type& type) {
+/// Refuses a shape with a key of other types, and one with some of its keys but not all. Returns whether it has them.
+bool check_keys(const Node& node, const Type& type) {
+  const bool has_any = std::ranges::any_of(type.required, [&](std::string_view key) { return node.has(std::string(key)); });
   for (const std::string key : {"center", "axis", "radius", "tube_radius", "angle", "feature_angle"}) {
     const bool is_required = std::ranges::find(type.required, key) != type.required.end();
     const bool is_allowed = is_required || (type.kind == Shape::Kind::fitted && key == "feature_angle");
-    if (is_required && !node.has(key))
-      node.fail("no " + key, key == "axis" ? "it beside the type: of a plane its normal" : "it beside the type");
+    if (has_any && is_required && !node.has(key))
+      node.fail("no " + key, fmt::format("{}, or none of {}: the vertices of the surface then tell them", key,
+                                         fmt::join(type.required, ", ")));
     if (!is_allowed && node.has(key))
       node[key].fail(fmt::format("it beside \"{}\"", type.name), fmt::format("no {} there", key));
   }
+  return has_any;
 }
 
-Shape read_shape(const Node& node, int dim, const std::set<int>& with_facets, const Sets& sets) {
-  constexpr double kDegree = std::numbers::pi / 180,
-                   kFeatureAngle = 40;  // keeps corners of octagons, and lets 12 be a circle
-  Shape shape{.surfaces = read_surfaces(node["surface"], sets, with_facets, "the ids of the surfaces that have the shape")};
-  const Type& type = read_type(node, dim);
-  check_keys(node, type);
-  shape.kind = type.kind;
-  if (node.has("sag")) shape.sag = node["sag"].positive(1);
-  if (type.kind == Shape::Kind::fitted) shape.angle = kDegree * node["feature_angle"].positive(kFeatureAngle);
-  if (node.has("center")) shape.center = read_vector_of(node["center"], dim, shape.center);
+/// The numbers that stand in an entry.
+void read_numbers(const Node& node, int dim, Shape& shape) {
+  shape.center = read_vector_of(node["center"], dim, shape.center);
   if (node.has("axis")) {
     shape.axis = read_vector_of(node["axis"].without_units(), dim, shape.axis);
     if (!(shape.axis.norm() > 0)) node["axis"].fail("a direction");
@@ -88,25 +85,98 @@ Shape read_shape(const Node& node, int dim, const std::set<int>& with_facets, co
   }
   if (node.has("radius")) shape.radius = node["radius"].positive(1);
   if (node.has("tube_radius")) shape.tube_radius = node["tube_radius"].positive(1);
-  return shape;
+}
+
+ShapeEntry read_entry(const Node& node, int dim, const std::set<int>& surfaces, const Sets& sets) {
+  constexpr double kFeatureAngle = 40;  // keeps corners of octagons, and lets 12 be a circle
+  Shape shape{.surfaces = read_surfaces(node["surface"], sets, surfaces, "the ids of the surfaces that have the shape")};
+  const Type& type = read_type(node, dim);
+  const bool has_numbers = check_keys(node, type);
+  shape.kind = type.kind;
+  if (node.has("sag")) shape.sag = node["sag"].positive(1);
+  if (type.kind == Shape::Kind::fitted && dim == 2) shape.angle = kDegree * node["feature_angle"].positive(kFeatureAngle);
+  read_numbers(node, dim, shape);
+  return {node, std::move(shape), has_numbers};
+}
+
+/// Corners of the boundary facets that have one of these tags, as triangles.
+template <int Dim>
+std::vector<SurfaceTriangle> triangles_of(const Mesh<Dim>& mesh, const std::vector<int>& tags) {
+  std::vector<SurfaceTriangle> triangles;
+  for (const FacetId f : mesh.live_facets()) {
+    if (std::ranges::find(tags, mesh.facet_tag(f)) == tags.end()) continue;
+    const auto& v = mesh.facet(f);
+    if constexpr (Dim == 2)
+      std::ranges::copy(raised(mesh.rest(v[0]), mesh.rest(v[1])), std::back_inserter(triangles));
+    else
+      triangles.push_back({mesh.rest(v[0]), mesh.rest(v[1]), mesh.rest(v[2])});
+  }
+  return triangles;
 }
 
 }  // namespace
 
+std::array<SurfaceTriangle, 2> raised(const Vec<2>& a, const Vec<2>& b) {
+  const Vec<3> low_a(a[0], a[1], 0), low_b(b[0], b[1], 0), up(0, 0, (b - a).norm());
+  return {SurfaceTriangle{low_a, low_b, low_b + up}, SurfaceTriangle{low_a, low_b + up, low_a + up}};
+}
+
 template <int Dim>
-void read_shapes(const Node& root, const Sets& sets, Setup<Dim>& setup) {
-  const std::set<int> with_facets = sets.facet_tags(setup.mesh);
+std::vector<ShapeEntry> read_shapes(const Node& root, const Sets& sets, const std::set<int>& surfaces) {
+  std::vector<ShapeEntry> entries;
   std::set<int> taken;
   for (const Node& node : root["shapes"].items()) {
-    const auto shape = std::make_shared<const Shape>(read_shape(node, Dim, with_facets, sets));
-    setup.shapes.push_back(shape);
-    for (const int tag : std::set<int>(shape->surfaces.begin(), shape->surfaces.end()))
+    entries.push_back(read_entry(node, Dim, surfaces, sets));
+    for (const int tag : entries.back().shape.surfaces)
       if (!taken.insert(tag).second)
         node["surface"].fail(abbreviate(node["surface"].json()) + ", which another shape has, too", "one shape a surface");
   }
+  return entries;
 }
 
-template void read_shapes(const Node&, const Sets&, Setup<2>&);
-template void read_shapes(const Node&, const Sets&, Setup<3>&);
+template <int Dim>
+Shape shape_through(const ShapeEntry& entry, std::span<const SurfaceTriangle> triangles) {
+  constexpr double kTolerance = 1e-5;  // of the diagonal: meshes of CAD programs have fewer digits than doubles
+  using enum Shape::Kind;
+  const Shape& asked = entry.shape;
+  if (entry.has_numbers || (Dim == 2 && asked.kind == fitted)) return asked;
+  Eigen::AlignedBox<double, 3> box;
+  for (const SurfaceTriangle& triangle : triangles)
+    for (const Vec<3>& corner : triangle) box.extend(corner);
+  const double tolerance = kTolerance * box.diagonal().norm();
+  const std::optional<ShapeFit> fit = asked.kind == fitted
+                                          ? recognize_shape(triangles, tolerance)
+                                          : fit_shape(Dim == 2 && asked.kind == sphere ? cylinder : asked.kind, triangles);
+  const std::string found = abbreviate(entry.node["surface"].json()) + ", whose vertices lie on no ";
+  const std::string expected = "a surface of one geometry, or the numbers of the type beside it";
+  if (asked.kind == fitted && !fit) entry.node["surface"].fail(found + "plane, sphere, cylinder, cone or torus", expected);
+  if (!fit || fit->farthest > tolerance)
+    entry.node["surface"].fail(
+        found + entry.node["type"].string("") +
+            (fit ? fmt::format(": one is {} off the nearest", entry.node.document().units.text(fit->farthest, "m", 3)) : ""),
+        expected);
+  Shape shape = fit->shape;
+  shape.surfaces = asked.surfaces;
+  shape.sag = asked.sag;
+  if (Dim == 2) {
+    shape.kind = asked.kind;
+    shape.center[2] = 0;
+    shape.axis = Vec<3>(shape.axis[0], shape.axis[1], 0).normalized();
+  }
+  return shape;
+}
+
+template <int Dim>
+void add_shapes(const std::vector<ShapeEntry>& entries, Setup<Dim>& setup) {
+  for (const ShapeEntry& entry : entries)
+    if (const auto triangles = triangles_of<Dim>(setup.mesh, entry.shape.surfaces); !triangles.empty())
+      setup.shapes.push_back(std::make_shared<const Shape>(shape_through<Dim>(entry, triangles)));
+}
+
+#define ITR_INSTANTIATE(Dim)                                                                         \
+  template std::vector<ShapeEntry> read_shapes<Dim>(const Node&, const Sets&, const std::set<int>&); \
+  template Shape shape_through<Dim>(const ShapeEntry&, std::span<const SurfaceTriangle>);            \
+  template void add_shapes(const std::vector<ShapeEntry>&, Setup<Dim>&);
+ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr::scene

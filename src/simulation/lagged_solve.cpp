@@ -292,7 +292,7 @@ class LaggedSolve {
       potential_.inertia()->add_mass_product(step_to_start, extras.gradient_of_step);
       extras.step_to_start = std::move(step_to_start);
     }
-    if (terms_.has_inertia && !rigid_)
+    if (terms_.has_inertia && !rigid_ && loose_force_ == 0)
       extras.add_inertia_of_motion = [this](ConstVectorView d, VectorView gradient) {
         potential_.inertia()->add_mass_product(d, gradient);
       };

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "accuracy.hpp"
@@ -17,6 +18,7 @@
 #include "energy/elastic/law_table.hpp"
 #include "energy/elastic/patched_volume.hpp"
 #include "fem/quadrature.hpp"
+#include "geometry/shape.hpp"
 #include "itr/core.hpp"
 #include "linear/choice.hpp"
 #include "mesh/rest_box.hpp"
@@ -36,6 +38,35 @@ static_assert(std::size(kLaws) == static_cast<std::size_t>(MaterialLaw::own) + 1
 
 void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
+}
+
+std::string place_text(const Vec<3>& place, int dim, const Units* units) {
+  std::vector<std::string> numbers;
+  for (int c = 0; c < dim; ++c) numbers.push_back(fmt::format("{:.7g}", units ? units->from_si(place[c], "m") : place[c]));
+  return fmt::format("({})", fmt::join(numbers, ", "));
+}
+
+std::string describe(const Shape& shape, int dim, const Units& units) {
+  const std::string center = place_text(shape.center, dim, &units), axis = place_text(shape.axis, dim, nullptr);
+  const auto length = [&](double value) { return units.text(value, "m", 7); };
+  using enum Shape::Kind;
+  switch (shape.kind) {
+    case plane:
+      return fmt::format("{} through {}, normal {}", dim == 2 ? "line" : "plane", center, axis);
+    case sphere:
+      return fmt::format("{} of radius {} around {}", dim == 2 ? "circle" : "sphere", length(shape.radius), center);
+    case cylinder:
+      return fmt::format("cylinder of radius {} around the axis {} through {}", length(shape.radius), axis, center);
+    case cone:
+      return fmt::format("cone of {:.7g} degrees between surface and axis {}, apex {}", 180 / std::numbers::pi * shape.angle,
+                         axis, center);
+    case torus:
+      return fmt::format("torus of radii {} and {} (tube) around {}, axis {}", length(shape.radius), length(shape.tube_radius),
+                         center, axis);
+    case fitted:
+      return "curves through its vertices";
+  }
+  return "";
 }
 
 std::string coefficients_text(const ContactOptions& contact) {
@@ -104,6 +135,7 @@ class Explanation {
     const linear::MatrixTraits matrix = unknowns();
     fmt::print("linear solver\n  {}\n", solver(matrix));
     if (setup_.contact.enabled) contact();
+    shapes();
     defaults();
     if (accuracy_.value > 0) fmt::print("accuracy\n");
     for (const std::string& line : describe_accuracy(accuracy_)) fmt::print("  {}\n", line);
@@ -268,6 +300,13 @@ class Explanation {
     const ContactEnergy<Dim> energy(surface, setup_.contact, 1, 1);
     fmt::print("; d-hat {}, {} pairs nearer than that at the start\n", setup_.units.text(setup_.contact.dhat, "m"),
                energy.active(x, workspace).size());
+  }
+
+  /// Geometries of surfaces of bodies: their numbers may come from vertices.
+  void shapes() const {
+    if (!setup_.shapes.empty()) fmt::print("shapes\n");
+    for (const auto& shape : setup_.shapes)
+      fmt::print("  surface {}: {}\n", fmt::join(shape->surfaces, ", "), describe(*shape, Dim, setup_.units));
   }
 
   linear::Registry& registry_;

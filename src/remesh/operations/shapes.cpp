@@ -5,7 +5,6 @@
 #include <cmath>
 #include <iterator>
 #include <map>
-#include <numbers>
 
 #include "geometry/shape.hpp"
 #include "mesh/cell_of_facet.hpp"
@@ -132,10 +131,7 @@ class ShapeOperation {
 
  private:
   static constexpr double kTolerance = 1e-14;  ///< how far off its shape a vertex counts as on it, by the mesh's diagonal
-  /// Angle by which a shape turns along an edge, wherever it is: material of a body that turns, or is about to touch, is
-  /// there before.
-  static constexpr double kMostTurn = 2 * std::numbers::pi / (Dim == 2 ? 96 : 32);
-  static constexpr double kWorthMoving = 10;  ///< tolerances from which on it is moved
+  static constexpr double kWorthMoving = 10;   ///< tolerances from which on it is moved
 
   bool has_shape(FacetId f) const { return shape_of_.contains(mesh_.facet_tag(f)); }
   std::vector<VertexId> shaped_vertices() const {
@@ -298,7 +294,8 @@ class ShapeOperation {
     for (const VertexId v : edge)  // halves would be no nearer to the shape
       if (carriers.distance(mesh_.rest(v)) > kWorthMoving * tolerance_) return 0;
     const double sag = carriers.distance((mesh_.rest(edge[0]) + mesh_.rest(edge[1])) / 2);
-    const bool is_coarse = sag > kMostTurn / 8 * (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).norm();
+    // Wherever it is: material of a body that turns, or is about to touch, is there before.
+    const bool is_coarse = sag > kMostSag<Dim> * (mesh_.rest(edge[0]) - mesh_.rest(edge[1])).norm();
     const bool is_seen = queries_.has_contact() &&
                          sag > carriers.most_sag(kMostOverhang * queries_.context().contact.dhat) && may_touch(edge, sag);
     return is_coarse || is_seen ? sag : 0;
