@@ -180,6 +180,7 @@ TEST_F(SceneTest, WrongCoefficientsOfLawsAreNamed) {
   const auto place = [&](const char* text) { return wrong_place({{"materials", json::parse(text)}}); };
   EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1]})"), "/materials/K");
   EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1], "K": -1})"), "/materials/K");
+  EXPECT_EQ(place(R"({"type": "ArrudaBoyce", "mu": 1, "lambda_m": 1, "K": 1})"), "/materials/lambda_m");
   EXPECT_EQ(place(R"({"type": "Yeoh", "C": [], "K": 1})"), "/materials/C");
   EXPECT_EQ(place(R"({"type": "Yeoh", "C": [-1], "K": 1})"), "/materials");  // no shear modulus
   EXPECT_EQ(place(R"({"type": "Yeoh", "C": [1], "K": 1, "mus": [1]})"), "/materials/mus");

@@ -63,6 +63,15 @@ TrialScene scene_of_all_terms() {
       std::dynamic_pointer_cast<const ViscousField<2>>(
           ViscousStep<2>(std::dynamic_pointer_cast<const ViscousField<2>>(state), viscous, 0.1).end(start, x, 0.1).state),
       viscous, 0.1);
+  auto softening = scene.context.materials;
+  for (auto& [body, material] : softening) {
+    material.law = MaterialLaw::mooney_rivlin;
+    material.mooney_rivlin = {.c1 = 100, .c2 = 10};
+    material.mullins = MullinsSoftening{2, 1, 0.1};
+  }
+  for (Eigen::Index k = 0; k + 1 < x.size(); k += 2) x[k] += 0.5 * x[k + 1];  // growth alone stores no energy of shape
+  scene.context.softening = std::make_shared<SofteningStep<2>>(
+      std::dynamic_pointer_cast<const SofteningField<2>>(begin_softening<2>(start, softening, x, 0)), softening);
   scene.context.follower = [](const VectorX& x) {
     return std::vector<std::shared_ptr<const Energy>>{std::make_shared<LinearizedForces<2>>(VectorX(), x, 1)};
   };
@@ -122,6 +131,7 @@ TEST(Terms, OfTheTableAreThoseThatAreSummed) {
   const std::vector<std::pair<TermKind, std::function<void(StepContext<2>&)>>> without = {
       {TermKind::inertia, [](auto& c) { c.has_inertia = false; }},
       {TermKind::viscous, [](auto& c) { c.viscous = nullptr; }},
+      {TermKind::softening, [](auto& c) { c.softening = nullptr; }},
       {TermKind::loads, [](auto& c) { c.loads.acceleration = nullptr, c.loads.tractions.clear(); }},
       {TermKind::host, [](auto& c) { c.host.clear(); }},
       {TermKind::follower, [](auto& c) { c.follower = nullptr; }},

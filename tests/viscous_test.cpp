@@ -13,6 +13,7 @@
 
 #include "advance.hpp"
 #include "derivatives.hpp"
+#include "driven.hpp"
 #include "energy/elastic/law_sum.hpp"
 #include "itr/solver.hpp"
 #include "mesh/refine.hpp"
@@ -53,63 +54,11 @@ std::vector<Material> viscous_laws() {
   return laws;
 }
 
-template <int Dim>
-Mesh<Dim> body(int n) {
-  if constexpr (Dim == 2) return make_square(n, 1);
-  std::mt19937 random(3);
-  Mesh<Dim> mesh = [&] {
-    if constexpr (Dim == 3)
-      return make_cube(n, random, 0.1);
-    else
-      return make_square(n, 1);
-  }();
-  for (FacetId f = 0; f < mesh.facet_slots(); ++f) mesh.set_facet_tag(f, 1);
-  return mesh;
-}
-
-template <int Dim>
-using Motion = std::function<Mat<Dim>(double t)>;
-
-/// A body whose boundary moves by F(t), from F(0) at once; without inertia.
-template <int Dim>
-Setup<Dim> driven(const Material& material, const Motion<Dim>& F, double dt, int steps, int order = 1) {
-  Setup<Dim> setup;
-  setup.mesh = body<Dim>(2);
-  setup.order[1] = order;
-  setup.materials[1] = material;
-  const auto displacement = [F](const Vec<Dim>& X, double t) { return Vec<Dim>(F(t) * X - X); };
-  for (const int tag : {1, 2, 3, 4}) {
-    DirichletCondition<Dim> condition{tag, {}, displacement};
-    condition.components.fill(true);
-    setup.dirichlet.push_back(condition);
-  }
-  setup.initial_displacement.push_back({1, displacement});
-  setup.time = {.quasistatic = true, .dt = dt, .steps = steps};
-  setup.newton.step_tolerance = 0;
-  setup.newton.gradient_tolerance = setup.newton.first_gradient_tolerance = 1e-11;
-  return setup;
-}
-
-template <int Dim>
-Mat<Dim> stress_in(const Simulation<Dim>& simulation, std::size_t cell = 0) {
-  const auto stress = cell_stress(simulation).cauchy;
-  return Eigen::Map<const Mat<Dim>>(&stress.at(cell * Dim * Dim)).transpose();  // rows are stored
-}
-
 /// Stress of the law with other moduli of shape.
 template <int Dim>
 Mat<Dim> stress_of(Material material, double deviator, const Mat<Dim>& F) {
   material.deviator = deviator;
   return elastic_stress<Dim>(F, elastic_moduli<Dim>(material, Vec<Dim>::Zero())) * F.transpose() / F.determinant();
-}
-
-template <int Dim>
-Mat<Dim> sheared() {
-  Mat<Dim> F = Mat<Dim>::Identity();
-  F(0, 0) = 1.3;
-  F(1, 1) = 0.8;
-  F(0, 1) = 0.4;
-  return F;
 }
 
 TEST(Viscous, DeviatorScalesModuliOfShapeAlone) {
@@ -171,22 +120,13 @@ std::shared_ptr<const ViscousField<Dim>> relaxed_field(const Mesh<Dim>& mesh, co
 }
 
 template <int Dim>
-VectorX moved(const Mesh<Dim>& mesh, double size, std::mt19937& random) {
-  std::uniform_real_distribution<double> shift(-size, size);
-  VectorX x(Dim * mesh.num_nodes());
-  for (int v = 0; v < mesh.num_nodes(); ++v)
-    for (int c = 0; c < Dim; ++c) x[Dim * v + c] = mesh.point_of_node(v)[c] + shift(random);
-  return x;
-}
-
-template <int Dim>
 void expect_energy_with_derivatives(Mesh<Dim> mesh, Material material) {
   std::mt19937 random(5);
   const std::map<int, Material> materials = {{1, material}, {2, material}};
   const VectorX before = moved(mesh, 0.02, random), x = moved(mesh, 0.02, random);
   const auto step = std::make_shared<ViscousStep<Dim>>(relaxed_field(mesh, materials, before), materials, 0.1);
   const CellSet<Dim> cells = whole_mesh(mesh, {});
-  const ViscousEnergy<Dim> energy(cells, step, 0.7, kElasticDegree);
+  const ViscousEnergy<Dim> energy("viscous", cells, ViscousPast<Dim>(cells, step), 0.7, kElasticDegree);
   expect_derivatives(energy, x, 1e-6, 1e-6);
   expect_psd(energy, x);
 }

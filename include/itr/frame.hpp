@@ -134,9 +134,11 @@ struct ITR_EXPORT StepReport {
   double shape_energy = 0;
   /// Energy that the projection onto the new mesh forgot, 1/2 ||xhat_old - xhat_new||^2 / (alpha h^2) of the predictor [J]:
   /// not gained by remeshing, though the total is lower by it. Of viscoelastic bodies, too, what their state lost where it
-  /// was averaged over new cells. Over all parts of a step that was cut.
+  /// was averaged over new cells, and of softening ones the dissipated energy that the cells put elsewhere. Over all parts
+  /// of a step that was cut.
   double history_loss = 0;
   double viscous_dissipation = 0;  ///< by viscoelastic bodies [J]
+  double softening = 0;            ///< energy that Mullins' softening dissipated [J]
   double wetted = 0;               ///< part of the rest area that fluids may wet where they are
   int leaks = 0;                   ///< fluids that have come to where they should not
   /// By body that edits touched: momentum that they changed, as impulses over the step. The rate of momentum (the

@@ -67,6 +67,14 @@ struct PronyTerm {
   double tau;  ///< [s]
 };
 
+/// Mullins' softening (docs/theory.md, "Softening"): below the largest density W_max of the past the energy density W of
+/// changes of shape counts 1 - erf((W_max - W) / (m + beta W_max)) / r times.
+struct MullinsSoftening {
+  double r;     ///< > 1
+  double m;     ///< [Pa]
+  double beta;  ///< not both of these 0
+};
+
 /// The material of a body. In 2D all values are per unit thickness.
 struct Material {
   MaterialLaw law = MaterialLaw::neo_hookean;
@@ -79,6 +87,7 @@ struct Material {
   std::function<std::shared_ptr<const OwnLaw>(double t)> own_at{};  ///< that at time t [s] instead; empty: `own` always
   VolumeForm volume = VolumeForm::pointwise;
   std::vector<PronyTerm> prony{};  ///< viscoelasticity of the deviator (docs/theory.md, "Viscoelasticity"); empty: elastic
+  std::optional<MullinsSoftening> mullins{};  ///< empty: none
   /// Factor of the law's resistance to changes of shape, which leaves its bulk modulus at rest as it is; with terms of
   /// `prony` the instantaneous law has it.
   double deviator = 1;
@@ -100,6 +109,9 @@ struct Material {
     return dim == 2 && !plane_strain ? nu * E / (1 - nu * nu) : E * nu / ((1 + nu) * (1 - 2 * nu));
   }
 };
+
+/// Whether stresses depend on where the body has been.
+inline bool has_memory(const Material& material) { return !material.prony.empty() || material.mullins; }
 
 // Contact.
 

@@ -14,6 +14,7 @@
 #include "energy/inertia.hpp"
 #include "energy/polyfem/adhesion.hpp"
 #include "energy/pressure.hpp"
+#include "energy/softening.hpp"
 #include "energy/terms.hpp"
 #include "energy/viscous.hpp"
 #include "fem/vertex_map.hpp"
@@ -64,6 +65,7 @@ class IncrementalPotential {
     visit(TermKind::inertia, inertia_);
     visit(TermKind::elastic, elastic_);
     visit(TermKind::viscous, viscous_);
+    visit(TermKind::softening, softening_);
     visit(TermKind::loads, loads_);
     for (const auto& term : host_) visit(TermKind::host, term);
     for (const auto& term : lagged.follower) visit(TermKind::follower, term);
@@ -108,6 +110,7 @@ class IncrementalPotential {
   std::shared_ptr<InertiaEnergy<Dim>> inertia_;
   std::shared_ptr<ElasticEnergy<Dim>> elastic_;
   std::shared_ptr<ViscousEnergy<Dim>> viscous_;
+  std::shared_ptr<SofteningEnergy<Dim>> softening_;
   std::shared_ptr<LoadEnergy<Dim>> loads_;
   std::vector<std::shared_ptr<const Energy>> cavities_;
   std::shared_ptr<ContactEnergy<Dim>> contact_, spare_contact_;  ///< the second: to be renewed

@@ -22,13 +22,16 @@ namespace itr {
 
 template <int Dim>
 class ViscousStep;
+template <int Dim>
+class SofteningStep;
 
 /// Options and loads of all terms of a step; the cells of the sum come from a CellSet.
 template <int Dim>
 struct PotentialTerms {
-  std::map<int, Material> materials;                  ///< by body; of viscoelastic ones the moduli over the step
-  std::shared_ptr<const ViscousStep<Dim>> viscous{};  ///< what their past adds to it; null: there are none
-  Loads<Dim> loads;                                   ///< at the end of the step
+  std::map<int, Material> materials;                      ///< by body; of viscoelastic ones the moduli over the step
+  std::shared_ptr<const ViscousStep<Dim>> viscous{};      ///< what their past adds to it; null: there are none
+  std::shared_ptr<const SofteningStep<Dim>> softening{};  ///< the same of bodies that soften
+  Loads<Dim> loads;                                       ///< at the end of the step
   bool has_inertia = true;
   bool axisymmetric = false;  ///< CellSet::axisymmetric of all cells
   MassKind mass = MassKind::consistent;
@@ -50,6 +53,7 @@ enum class TermKind {
   inertia,
   elastic,
   viscous,
+  softening,
   loads,
   host,
   follower,
@@ -64,7 +68,7 @@ enum class TermKind {
   damping,
   contact_damping
 };
-inline constexpr std::size_t kNumTermKinds = 16;
+inline constexpr std::size_t kNumTermKinds = 17;
 
 /// Entries of a report of energies, in the order in which its total is summed.
 enum class EnergyEntry { inertia, elastic, body, contact, friction, damping, host };
@@ -134,6 +138,12 @@ inline constexpr std::array<TermTraits<Dim>, kNumTermKinds> kTerms{{
     {.kind = TermKind::viscous,
      .is_in = [](const PotentialTerms<Dim>& terms) { return terms.viscous != nullptr; },
      .energy = EnergyEntry::elastic,
+     .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
+     .is_stored = true},
+    {.kind = TermKind::softening,
+     .is_in = [](const PotentialTerms<Dim>& terms) { return terms.softening != nullptr; },
+     .energy = EnergyEntry::elastic,
+     .is_bounded = [](const PotentialTerms<Dim>&) { return true; },
      .needs_facets = [](const PotentialTerms<Dim>&) { return false; },
      .is_stored = true},
     {.kind = TermKind::loads,  // of its forces only tractions are reported: StepProblem::forces

@@ -9,10 +9,7 @@
 
 #include "core/parallel_reduce.hpp"
 #include "energy/elastic/law_sum.hpp"
-#include "energy/elastic/quadratic.hpp"
 #include "energy/elastic/strain.hpp"
-#include "energy/elastic/turned.hpp"
-#include "fem/quadrature.hpp"
 
 namespace itr {
 
@@ -21,7 +18,6 @@ namespace {
 using Voigt = Vec<6>;  ///< 00, 11, 22, 01, 02, 12 of a symmetric tensor
 constexpr std::array<std::array<int, 2>, 6> kEntries{{{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}}};
 constexpr std::size_t kElements = 64;  ///< of a task
-constexpr int kStateDegree = 2, kSampleDegree = 4;
 
 Mat<3> tensor(const Voigt& v) {
   Mat<3> A;
@@ -34,13 +30,6 @@ Voigt voigt(const Mat<3>& A) {
   return v;
 }
 double product(const Voigt& a, const Voigt& b) { return a.head<3>().dot(b.head<3>()) + 2 * a.tail<3>().dot(b.tail<3>()); }
-
-template <int LawDim>
-Mat<3> in_space(const Mat<LawDim>& G) {
-  Mat<3> all = Mat<3>::Zero();
-  all.template topLeftCorner<LawDim, LawDim>() = G;
-  return all;
-}
 
 /// M(F).
 Mat<3> shape_change(ShapeMeasure measure, const Mat<3>& G) {
@@ -71,47 +60,6 @@ struct ShapeResponse {
     }
   }
 };
-
-template <int Dim>
-Vec<3> point_in_space(const Vec<Dim>& X) {
-  Vec<3> all = Vec<3>::Zero();
-  all.template head<Dim>() = X;
-  return all;
-}
-
-template <int Dim>
-bool is_constant(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) {
-  return element.curved == 0 && !cells.axisymmetric;
-}
-
-/// f(site) for the points of an element by a rule, or for its barycenter where F is the same everywhere.
-template <int Dim, typename F>
-void visit_sites(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, int degree, const F& f) {
-  const auto& rule = quadrature<Dim>(is_constant(cells, element) ? 1 : degree);
-  for (const auto& point : rule) {
-    if constexpr (Dim == 2)
-      if (cells.axisymmetric) {
-        f(ElasticSite<2, 3>(cells, element, point));
-        continue;
-      }
-    f(ElasticSite<Dim, Dim>(cells, element, point));
-  }
-}
-
-template <int Columns>
-auto weights_of(const std::array<double, Columns>& weights) {
-  return Eigen::Map<const Vec<Columns>>(weights.data());
-}
-
-/// Values at the vertices of the function that is linear on a cell and has these values at the points of the rule of degree
-/// 2: of each point one weight is larger than the others.
-template <int Dim>
-typename ViscousField<Dim>::Records at_vertices(const typename ViscousField<Dim>::Records& at_points) {
-  const auto& rule = quadrature<Dim>(kStateDegree);
-  Mat<Dim + 1> weights;
-  for (int q = 0; q <= Dim; ++q) weights.col(q) = weights_of<Dim + 1>(rule[static_cast<std::size_t>(q)].weights);
-  return at_points * weights.inverse();
-}
 
 }  // namespace
 
@@ -152,77 +100,6 @@ Mat<9> past_hessian(ShapeMeasure measure, const Mat<3>& F, const Mat<3>& H) {
       hessian(k, l) = scale * entry;
     }
   return hessian;
-}
-
-template <int Dim>
-ViscousField<Dim>::ViscousField(const Mesh<Dim>& mesh, double t, std::vector<Records> by_cell)
-    : rest_(mesh.rest().begin(), mesh.rest().begin() + mesh.num_vertices()), t_(t), by_cell_(std::move(by_cell)) {
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    cells_.push_back(mesh.cell(c));
-    body_.push_back(mesh.body(c));
-  }
-}
-
-/// Whether an element is a cell of the field's mesh.
-template <int Dim>
-bool ViscousField<Dim>::has(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const {
-  if (element.cell < 0 || element.cell >= static_cast<int>(cells_.size()) || body_[element.cell] != element.body)
-    return false;
-  for (int k = 0; k <= Dim; ++k)
-    if (rest_[cells_[element.cell][k]] != cells.rest[element.vertices[k]]) return false;
-  return true;
-}
-
-template <int Dim>
-const Locator<Dim>& ViscousField<Dim>::locator() const {
-  std::call_once(once_, [this] { locator_ = std::make_unique<Locator<Dim>>(Mesh<Dim>(rest_, cells_, body_)); });
-  return *locator_;
-}
-
-template <int Dim>
-std::array<double, Dim + 1> ViscousField<Dim>::weights_in(CellId c, const Vec<Dim>& X) const {
-  const auto& vertices = cells_[c];
-  Mat<Dim> edges;
-  for (int k = 0; k < Dim; ++k) edges.col(k) = rest_[vertices[k + 1]] - rest_[vertices[0]];
-  return barycentric_weights<Dim>(rest_[vertices[0]], Mat<Dim>(edges.inverse()), X);
-}
-
-template <int Dim>
-typename ViscousField<Dim>::Records ViscousField<Dim>::on(const CellSet<Dim>& cells,
-                                                          const typename CellSet<Dim>::Element& element,
-                                                          VectorX* variance) const {
-  if (has(cells, element)) return by_cell_[element.cell];
-  const auto& rule = quadrature<Dim>(kSampleDegree);
-  std::vector<CellId> found;
-  for (const auto& point : rule)
-    found.push_back(locator().find(rest_position<Dim>(cells, element, point.weights), element.body).cell);
-  Records records;
-  if (std::ranges::all_of(found, [&](CellId c) { return c == found[0]; })) {
-    const Records& whole = by_cell_[found[0]];
-    records.resize(whole.rows(), Dim + 1);
-    for (int k = 0; k <= Dim; ++k)
-      records.col(k) = whole * weights_of<Dim + 1>(weights_in(found[0], cells.rest[element.vertices[k]]));
-    return records;
-  }
-  Records moments = Records::Zero(by_cell_[found[0]].rows(), Dim + 1);
-  MatrixX values(moments.rows(), static_cast<Eigen::Index>(rule.size()));
-  for (std::size_t q = 0; q < rule.size(); ++q) {
-    const Vec<Dim> X = rest_position<Dim>(cells, element, rule[q].weights);
-    const auto column = static_cast<Eigen::Index>(q);
-    values.col(column) = by_cell_[found[q]] * weights_of<Dim + 1>(weights_in(found[q], X));
-    moments += rule[q].fraction * values.col(column) * weights_of<Dim + 1>(rule[q].weights).transpose();
-  }
-  const VectorX mean = moments.rowwise().sum();
-  if (is_constant(cells, element))
-    records = mean.replicate(1, Dim + 1);
-  else  // by the mass matrix of linear functions, (1 + delta) / ((d + 1) (d + 2))
-    records = (Dim + 1) * (Dim + 2) * (moments - (mean / (Dim + 2)).replicate(1, Dim + 1));
-  if (!variance) return records;
-  if (variance->size() == 0) variance->setZero(mean.size());
-  for (std::size_t q = 0; q < rule.size(); ++q)
-    *variance += rule[q].fraction *
-                 (values.col(static_cast<Eigen::Index>(q)) - records * weights_of<Dim + 1>(rule[q].weights)).cwiseAbs2();
-  return records;
 }
 
 ViscousWeights::ViscousWeights(const PronyTerm& term, double dt) : g(term.g) {
@@ -301,9 +178,9 @@ typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cel
   int q = 0;
   double volume = 0, shear = 0;
   visit_sites(cells, element, kStateDegree, [&](const auto& site) {
-    const VectorX old = before * weights_of<Dim + 1>(site.point.weights);
+    const VectorX old = before * weights_of(site.point.weights);
     const Vec<3> X = point_in_space<Dim>(rest_position<Dim>(cells, element, site.point.weights));
-    const ShapeResponse law(material, X, in_space(site.displacement_gradient(u).G));
+    const ShapeResponse law(material, X, gradient_in_space(site.displacement_gradient(u).G));
     const double weight = site.weight(1);
     auto now = cell.records.col(q++);
     const Voigt S_before = old.head<6>();
@@ -333,7 +210,7 @@ typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cel
     volume += weight;
     shear = elastic_moduli<3>(material, X).lame.mu;
   });
-  cell.records = q == 1 ? Records(cell.records.col(0).replicate(1, Dim + 1)) : at_vertices<Dim>(cell.records);
+  cell.records = at_vertices<Dim>(cell.records, q);
   Eigen::Index row = Field::kOfLaw;
   for (const ViscousWeights& w : weights) {
     if (variance.size() > 0) {
@@ -356,31 +233,21 @@ double ViscousStep<Dim>::stored_excess(const CellSet<Dim>& cells, ConstVectorVie
 }
 
 template <int Dim>
-typename ViscousStep<Dim>::End ViscousStep<Dim>::end(const Mesh<Dim>& mesh, ConstVectorView x, double t) const {
-  const CellSet<Dim> cells = whole_mesh(mesh, {});
-  std::vector<Records> by_cell(cells.elements.size());
-  std::vector<std::array<double, 2>> lost(cells.elements.size());
-  parallel_blocks(cells.elements.size(), kElements, [&](std::size_t first, std::size_t last) {
-    for (std::size_t e = first; e < last; ++e) {
-      const auto& element = cells.elements[e];
-      if (!acts_on(element.body)) continue;
-      Cell cell = update(cells, element, x);
-      lost[e] = {cell.dissipation, cell.loss};
-      by_cell[static_cast<std::size_t>(element.cell)] = std::move(cell.records);
-    }
-  });
-  End end;
-  for (const auto& [dissipation, loss] : lost) {
-    end.dissipation += dissipation;
-    end.loss += loss;
-  }
+HistoryEnd ViscousStep<Dim>::end(const Mesh<Dim>& mesh, ConstVectorView x, double t) const {
+  auto [by_cell, end] = update_cells(
+      mesh, [&](int body) { return acts_on(body); },
+      [&](const CellSet<Dim>& cells, const auto& element, Records& records) -> std::array<double, 2> {
+        Cell cell = update(cells, element, x);
+        records = std::move(cell.records);
+        return {cell.dissipation, cell.loss};
+      });
   end.state = std::make_shared<ViscousField<Dim>>(mesh, t, std::move(by_cell));
   return end;
 }
 
 template <int Dim>
-std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
-                                                    ConstVectorView x, double t, bool has_relaxed) {
+std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
+                                                 ConstVectorView x, double t, bool has_relaxed) {
   using Field = ViscousField<Dim>;
   if (std::ranges::all_of(materials, [](const auto& entry) { return entry.second.prony.empty(); })) return nullptr;
   std::vector<typename Field::Records> at_rest;
@@ -393,118 +260,21 @@ std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>& mesh, const
 }
 
 template <int Dim>
-ViscousEnergy<Dim>::ViscousEnergy(const CellSet<Dim>& cells, std::shared_ptr<const ViscousStep<Dim>> step, double scale,
-                                  int degree)
-    : cells_(cells),
-      step_(std::move(step)),
-      past_(cells.elements.size()),
-      scale_(scale),
-      degree_(degree_with_turn(degree, cells.axisymmetric)) {
-  parallel_blocks(past_.size(), kElements, [&](std::size_t begin, std::size_t end) {
+ViscousPast<Dim>::ViscousPast(const CellSet<Dim>& cells, std::shared_ptr<const ViscousStep<Dim>> step)
+    : step_(std::move(step)), by_element_(cells.elements.size()) {
+  parallel_blocks(by_element_.size(), kElements, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e)
-      if (step_->acts_on(cells_.elements[e].body))
-        past_[e] = step_->past(cells_, cells_.elements[e]);
+      if (acts_on(cells.elements[e]))
+        by_element_[e] = step_->past(cells, cells.elements[e]);
       else
-        past_[e].setZero();
-  });
-}
-
-/// f(site, measure, H) for the points of a viscoelastic element.
-template <int Dim>
-template <typename F>
-void ViscousEnergy<Dim>::for_each_site(std::size_t e, const F& f) const {
-  const auto& element = cells_.elements[e];
-  if (!step_->acts_on(element.body)) return;
-  const ShapeMeasure measure = step_->measure(element.body);
-  visit_sites(cells_, element, degree_, [&](const auto& site) {
-    if (site.turn > 0) f(site, measure, tensor(past_[e] * weights_of<Dim + 1>(site.point.weights)));
+        by_element_[e].setZero();
   });
 }
 
 template <int Dim>
-double ViscousEnergy<Dim>::value_of(const Displacement<Dim>& u) const {
-  return scale_ * parallel_sum(past_.size(), kElements, [&](std::size_t begin, std::size_t end) {
-           double sum = 0;
-           for (std::size_t e = begin; e < end; ++e) {
-             const NodalDisplacements<Dim> nodal(cells_.elements[e], u);
-             for_each_site(e, [&](const auto& site, ShapeMeasure measure, const Mat<3>& H) {
-               sum += site.weight(1) * past_density(measure, in_space(site.displacement_gradient(nodal).G), H);
-             });
-           }
-           return sum;
-         });
-}
-
-template <int Dim>
-void ViscousEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, VectorView gradient) const {
-  const auto forces_of = [&](std::size_t e) -> Nodal<Dim> {
-    const NodalDisplacements<Dim> nodal(cells_.elements[e], u);
-    Nodal<Dim> forces = Nodal<Dim>::Zero();
-    for_each_site(e, [&](const auto& site, ShapeMeasure measure, const Mat<3>& H) {
-      const auto G = site.displacement_gradient(nodal).G;
-      constexpr int kLaw = decltype(G)::RowsAtCompileTime;
-      const Mat<3> P = past_stress(measure, in_space(G), H);
-      site.add_forces(site.weight(scale_), Mat<kLaw>(P.topLeftCorner<kLaw, kLaw>()), forces);
-    });
-    return forces;
-  };
-  parallel_then_ordered<Nodal<Dim>>(past_.size(), kElements, forces_of, [&](std::size_t e, const Nodal<Dim>& forces) {
-    const auto& element = cells_.elements[e];
-    const auto nodes = element.nodes();
-    for (int k = 0; k < kQuadraticNodes<Dim>; ++k)
-      if (has_node<Dim>(element.curved, k)) gradient.segment<Dim>(Dim * nodes[k]) += forces.col(k);
-  });
-}
-
-template <int Dim>
-void ViscousEnergy<Dim>::add_block(std::size_t e, ConstVectorView x, PsdProjection psd, Block& block) const {
-  const NodalDisplacements<Dim> nodal(cells_.elements[e], Displacement<Dim>(cells_.rest, x));
-  block.setZero();
-  ModalSum<Dim> modes(block);
-  for_each_site(e, [&](const auto& site, ShapeMeasure measure, const Mat<3>& H) {
-    if (measure == ShapeMeasure::small) return;
-    const auto G = site.displacement_gradient(nodal).G;
-    constexpr int kLaw = decltype(G)::RowsAtCompileTime;
-    const Mat<9> whole = past_hessian(measure, Mat<3>(in_space(G) + Mat<3>::Identity()), H);
-    Mat<kLaw * kLaw> hessian;
-    for (int l = 0; l < kLaw * kLaw; ++l)
-      for (int k = 0; k < kLaw * kLaw; ++k) hessian(k, l) = whole(k % kLaw + 3 * (k / kLaw), l % kLaw + 3 * (l / kLaw));
-    modes.add(decompose<kLaw>(hessian), psd, site, site.weight(scale_));
-  });
-  modes.finish();
-}
-
-template <int Dim>
-double ViscousEnergy<Dim>::value(ConstVectorView x, Workspace&) const {
-  return value_of({cells_.rest, x});
-}
-
-template <int Dim>
-void ViscousEnergy<Dim>::add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const {
-  add_gradient_of({cells_.rest, x}, gradient);
-}
-
-template <int Dim>
-double ViscousEnergy<Dim>::value_at(const Increment& at, Workspace&) const {
-  return value_of({cells_.rest, at.base, at.d});
-}
-
-template <int Dim>
-void ViscousEnergy<Dim>::add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const {
-  add_gradient_of({cells_.rest, at.base, at.d}, gradient);
-}
-
-template <int Dim>
-void ViscousEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, HessianSink& sink, Workspace&) const {
-  constexpr int kCorners = Dim * (Dim + 1);
-  const std::size_t straight = cells_.straight().size();
-  sink.target().add_elements<Dim>(cells_, [&](std::size_t e, Mat<kCorners>& block) {
-    Block all;
-    add_block(e, x, psd, all);
-    block = all.template topLeftCorner<kCorners, kCorners>();
-  });
-  sink.target().add_curved_elements<Dim>(
-      cells_, [&](std::size_t e, NodeSet, Block& block) { add_block(straight + e, x, psd, block); });
+typename ViscousPast<Dim>::Point ViscousPast<Dim>::at(std::size_t e, const typename CellSet<Dim>::Element& element,
+                                                      const QuadraturePoint<Dim>& point) const {
+  return {step_->measure(element.body), tensor(by_element_[e] * weights_of(point.weights))};
 }
 
 template <int Dim>
@@ -513,7 +283,7 @@ std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Record
                                         const Mat<3>& F) {
   using Field = ViscousField<Dim>;
   if (records.rows() == 0) return {Mat<3>::Zero(), 0};
-  const VectorX here = records * weights_of<Dim + 1>(weights);
+  const VectorX here = records * weights_of(weights);
   Voigt Q = Voigt::Zero();
   double density = 0;
   for (std::size_t i = 0; i < material.prony.size(); ++i) {
@@ -525,13 +295,12 @@ std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Record
   return {P * F.transpose() / F.determinant(), density};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                     \
-  template class ViscousField<Dim>;                                                                              \
-  template class ViscousStep<Dim>;                                                                               \
-  template class ViscousEnergy<Dim>;                                                                             \
-  template std::shared_ptr<const ViscousHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&, \
-                                                               ConstVectorView, double, bool);                   \
-  template std::pair<Mat<3>, double> past_of_state<Dim>(                                                         \
+#define ITR_INSTANTIATE(Dim)                                                                                  \
+  template class ViscousStep<Dim>;                                                                            \
+  template class ViscousPast<Dim>;                                                                            \
+  template std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&, \
+                                                            ConstVectorView, double, bool);                   \
+  template std::pair<Mat<3>, double> past_of_state<Dim>(                                                      \
       const ViscousField<Dim>::Records&, const std::array<double, Dim + 1>&, const Material&, const Mat<3>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

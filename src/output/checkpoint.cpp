@@ -27,10 +27,9 @@ constexpr const char* kChordLevels = "/checkpoint/chord_levels";
 constexpr const char* kStepControl = "/checkpoint/step_control";  ///< StepControl and History::dt, of adaptive steps
 constexpr const char* kDoublings = "/checkpoint/doublings";       ///< of flat obstacles
 
-/// ViscousField: its time, the number of rows of each cell, and these.
-constexpr const char* kViscousTime = "/checkpoint/viscous/t";
-constexpr const char* kViscousRows = "/checkpoint/viscous/rows";
-constexpr const char* kViscousRecords = "/checkpoint/viscous/records";
+/// Groups of a CellField: its time t, the number of `rows` of each cell, and these as `records`.
+constexpr const char* kViscous = "/checkpoint/viscous";
+constexpr const char* kSoftening = "/checkpoint/softening";
 
 std::string field_name(const char* kind, std::size_t age) {
   return std::string("/checkpoint/history/") + kind + "/" + std::to_string(age);
@@ -287,8 +286,8 @@ linear::FactorRecord read_factor(const fs::path& path, const hdf5::File& file) {
 }
 
 template <int Dim>
-void write_viscous(hdf5::File& file, const State<Dim>& state) {
-  const auto field = std::dynamic_pointer_cast<const ViscousField<Dim>>(state.history.viscous);
+void write_cells(hdf5::File& file, const std::string& group, const std::shared_ptr<const CellHistory>& history) {
+  const auto field = std::dynamic_pointer_cast<const CellField<Dim>>(history);
   if (!field) return;
   std::vector<std::int64_t> rows;
   std::vector<double> records;
@@ -296,31 +295,35 @@ void write_viscous(hdf5::File& file, const State<Dim>& state) {
     rows.push_back(of_cell.rows());
     records.insert(records.end(), of_cell.data(), of_cell.data() + of_cell.size());
   }
-  file.write(kViscousTime, std::array{field->time()}, 0);
-  file.write(kViscousRows, rows, 0);
-  file.write(kViscousRecords, records, 0);
+  file.write(group + "/t", std::array{field->time()}, 0);
+  file.write(group + "/rows", rows, 0);
+  file.write(group + "/records", records, 0);
 }
 
-template <int Dim>
-void read_viscous(const fs::path& path, const hdf5::File& file, State<Dim>& state) {
-  using Records = typename ViscousField<Dim>::Records;
-  const auto refuse = [&](const char* name, const std::string& found, const std::string& expected) {
+/// Null where the file has none.
+template <int Dim, typename Field>
+std::shared_ptr<const CellHistory> read_cells(const fs::path& path, const hdf5::File& file, const std::string& group,
+                                              const State<Dim>& state) {
+  using Records = typename Field::Records;
+  const std::string of_time = group + "/t", of_rows = group + "/rows", of_records = group + "/records";
+  if (!file.contains(of_time)) return nullptr;
+  const auto refuse = [&](const std::string& name, const std::string& found, const std::string& expected) {
     throw InputError({path.string(), name, found, expected});
   };
-  const std::vector<double> t = file.read_doubles(kViscousTime).values, records = file.read_doubles(kViscousRecords).values;
-  const std::vector<int> rows = read_ints(path, file, kViscousRows);
-  if (t.size() != 1) refuse(kViscousTime, std::to_string(t.size()) + " numbers", "1");
+  const std::vector<double> t = file.read_doubles(of_time).values, records = file.read_doubles(of_records).values;
+  const std::vector<int> rows = read_ints(path, file, of_rows);
+  if (t.size() != 1) refuse(of_time, std::to_string(t.size()) + " numbers", "1");
   if (static_cast<int>(rows.size()) != state.mesh.cell_slots())
-    refuse(kViscousRows, std::to_string(rows.size()) + " numbers", "one for every cell");
+    refuse(of_rows, std::to_string(rows.size()) + " numbers", "one for every cell");
   std::vector<Records> by_cell;
   std::size_t begin = 0;
   for (const int n : rows) {
     const std::size_t size = n < 0 ? records.size() : static_cast<std::size_t>(n) * (Dim + 1);
-    if (n < 0 || size > records.size() - begin) refuse(kViscousRecords, std::to_string(records.size()) + " numbers", "more");
+    if (n < 0 || size > records.size() - begin) refuse(of_records, std::to_string(records.size()) + " numbers", "more");
     by_cell.emplace_back(Eigen::Map<const Records>(records.data() + begin, n, Dim + 1));
     begin += size;
   }
-  state.history.viscous = std::make_shared<ViscousField<Dim>>(state.mesh, t[0], std::move(by_cell));
+  return std::make_shared<Field>(state.mesh, t[0], std::move(by_cell));
 }
 
 template <int Dim>
@@ -390,7 +393,8 @@ void write_checkpoint(hdf5::File& file, const State<Dim>& state, const Progress&
              std::array{state.created_energy, state.history.damp_next ? 1.0 : 0.0, state.stored_energy}, 0);
   if (const StepControl& control = state.control; control.dt > 0)
     file.write(kStepControl, std::array{control.dt, control.error, control.energy, state.history.dt}, 0);
-  write_viscous(file, state);
+  write_cells<Dim>(file, kViscous, state.history.viscous);
+  write_cells<Dim>(file, kSoftening, state.history.softening);
   write_memory(file, state.remesh_memory);
   write_strata(file, state.strata, state.mesh.num_vertices());
   write_factor(file, state.factor);
@@ -466,7 +470,8 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
   if (file.contains(kStepControl)) read_step_control(saved.file, file, state);
-  if (file.contains(kViscousTime)) read_viscous(saved.file, file, state);
+  state.history.viscous = read_cells<Dim, ViscousField<Dim>>(saved.file, file, kViscous, state);
+  state.history.softening = read_cells<Dim, SofteningField<Dim>>(saved.file, file, kSoftening, state);
   state.remesh_memory = read_memory(saved.file, file, state.mesh.num_vertices());
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);

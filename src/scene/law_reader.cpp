@@ -57,13 +57,16 @@ bool is_in(LawCoefficient::Range range, double value) {
       return value >= 0 && value <= 1.0 / 3;
     case Range::compressible:
       return is_poisson_ratio(value);
+    case Range::above_one:
+      return value > 1;
     default:
       return true;
   }
 }
 const char* words_of(LawCoefficient::Range range) {
   constexpr const char* kWords[] = {"a number",           "a number > 0",         "a number that is not 0",
-                                    "a number of [0, 1]", "a number of [0, 1/3]", "a number of (-1, 0.5)"};
+                                    "a number of [0, 1]", "a number of [0, 1/3]", "a number of (-1, 0.5)",
+                                    "a number > 1"};
   return kWords[static_cast<std::size_t>(range)];
 }
 

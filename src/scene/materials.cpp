@@ -43,6 +43,7 @@ class MaterialReader {
     material_.density = requirements_.back().value.constant;
     material_.density_at = requirements_.back().value.function;
     if (node.has("prony")) read_prony(node["prony"]);
+    if (node.has("mullins")) read_mullins(node["mullins"]);
   }
 
   /// At the barycenters of the elements that have the material.
@@ -112,6 +113,20 @@ class MaterialReader {
     }
     if (!(sum < 1)) prony["g"].fail("shares of a sum below 1, by which the moduli relax");
     if (prony["long_term"].boolean(false)) material_.deviator = 1 / (1 - sum);
+  }
+
+  void read_mullins(const Node& mullins) {
+    if (const std::string why = why_not_softening(material_, dimension_); !why.empty())
+      mullins.fail("softening of " + why, "a law and a plane that have an isochoric part in space, without prony");
+    const auto read = [&](const char* key) {
+      const double value = mullins.has(key) ? mullins[key].number(0) : -1;
+      if (!(value >= 0)) mullins[key].fail("a number >= 0");
+      return value;
+    };
+    const MullinsSoftening read_values{read("r"), read("m"), read("beta")};
+    if (!(read_values.r > 1)) mullins["r"].fail("a number > 1");
+    if (read_values.m + read_values.beta == 0) mullins["m"].fail("a number > 0 where beta is 0");
+    material_.mullins = read_values;
   }
 
   ScalarValue read_required(const char* key) const {

@@ -18,6 +18,7 @@
 #include "energy/elastic/turned.hpp"
 #include "energy/inertia.hpp"
 #include "energy/rigid_body.hpp"
+#include "energy/softening.hpp"
 #include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "fem/locator.hpp"
@@ -104,12 +105,14 @@ struct FrameCells {
   CellSet<Dim> cells;
   PatchPressures<Dim> pressures;
   std::vector<double> densities;
-  std::shared_ptr<const ViscousField<Dim>> viscous;  ///< null: no body is viscoelastic
+  std::shared_ptr<const ViscousField<Dim>> viscous;      ///< null: no body is viscoelastic
+  std::shared_ptr<const SofteningField<Dim>> softening;  ///< null: no body softens
 
   FrameCells(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x)
       : materials(materials_at(setup, state.t)),
         cells(whole_mesh(state.mesh, {})),
-        viscous(std::dynamic_pointer_cast<const ViscousField<Dim>>(state.history.viscous)) {
+        viscous(std::dynamic_pointer_cast<const ViscousField<Dim>>(state.history.viscous)),
+        softening(std::dynamic_pointer_cast<const SofteningField<Dim>>(state.history.softening)) {
     add_patches(materials, cells);
     if (!cells.patches) return;
     const auto rule_of = [&](std::size_t e) -> const auto& {
@@ -131,9 +134,11 @@ struct FrameCells {
   /// Stress in space and energy density that the past adds at a point of an element.
   std::pair<Mat<3>, double> past(const Material& material, const typename CellSet<Dim>::Element& element,
                                  const CellPoint<Dim>& point) const {
+    const auto cell = static_cast<std::size_t>(element.cell);
+    if (softening && material.mullins)
+      return softening_of_state<Dim>(softening->by_cell()[cell], point.weights, material, point.X, in_space(point).first);
     if (!viscous || material.prony.empty()) return {Mat<3>::Zero(), 0};
-    return past_of_state<Dim>(viscous->by_cell()[static_cast<std::size_t>(element.cell)], point.weights, material,
-                              in_space(point).first);
+    return past_of_state<Dim>(viscous->by_cell()[cell], point.weights, material, in_space(point).first);
   }
   /// Mean energy density of the patches in an element.
   double density(const typename CellSet<Dim>::Element& element, std::span<const CellPoint<Dim>> points) const {

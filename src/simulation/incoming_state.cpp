@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "energy/softening.hpp"
 #include "energy/tie.hpp"
 #include "energy/viscous.hpp"
 #include "itr/core.hpp"
@@ -115,17 +116,15 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
                    fmt::format("0 to {}", FlatObstacles<Dim>::kMostDoublings));
 }
 
-/// Refuses a state whose cells relax by other numbers of terms than their materials.
-template <int Dim>
-void check_viscous(const Setup<Dim>& setup, const State<Dim>& state) {
-  using Field = ViscousField<Dim>;
-  const auto field = std::dynamic_pointer_cast<const Field>(state.history.viscous);
+/// Refuses records of cells that are not as many as their material has.
+template <int Dim, typename Field, typename F>
+void check_cells(const Setup<Dim>& setup, const State<Dim>& state, const std::shared_ptr<const CellHistory>& saved,
+                 const char* name, const F& rows_of) {
+  const auto field = std::dynamic_pointer_cast<const Field>(saved);
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c) {
-    const auto terms = static_cast<Eigen::Index>(setup.materials.at(state.mesh.body(c)).prony.size());
-    const Eigen::Index rows = terms == 0 ? 0 : Field::kOfLaw + Field::kOfTerm * terms;
+    const Eigen::Index rows = rows_of(setup.materials.at(state.mesh.body(c)));
     const Eigen::Index found = field ? field->by_cell().at(static_cast<std::size_t>(c)).rows() : 0;
-    if (found != rows)
-      refuse_state("saved terms of viscoelasticity", std::to_string(found) + " numbers in a cell", std::to_string(rows));
+    if (found != rows) refuse_state(name, std::to_string(found) + " numbers in a cell", std::to_string(rows));
   }
 }
 
@@ -227,6 +226,7 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
   state.history.viscous = begin_viscous<Dim>(state.mesh, setup.materials, state.history.x[0], state.t, setup.time.is_static);
+  state.history.softening = begin_softening<Dim>(state.mesh, setup.materials, state.history.x[0], state.t);
   refuse_deformed(setup, state);
   return state;
 }
@@ -243,7 +243,12 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
     require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved().size());
   if (!state.chords.empty())
     require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(mesh.num_curved()));
-  check_viscous(setup, state);
+  using Viscous = ViscousField<Dim>;
+  check_cells<Dim, Viscous>(setup, state, state.history.viscous, "saved terms of viscoelasticity", [](const Material& of) {
+    return of.prony.empty() ? 0 : Viscous::kOfLaw + Viscous::kOfTerm * static_cast<Eigen::Index>(of.prony.size());
+  });
+  check_cells<Dim, SofteningField<Dim>>(setup, state, state.history.softening, "saved softening",
+                                        [](const Material& of) -> Eigen::Index { return of.mullins ? 1 : 0; });
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
   for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
                                     std::pair("barrier stiffness", state.stiffness.value)})

@@ -300,6 +300,7 @@ class OverlapResolver {
     if (setup_.contact.adaptive_stiffness) state_.stiffness = after.stiffness;
     state_.stored_energy = after.stored_energy;
     state_.history.viscous = std::move(after.history.viscous);
+    state_.history.softening = std::move(after.history.softening);
     return result.report;
   }
 

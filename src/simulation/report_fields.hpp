@@ -89,6 +89,7 @@ inline constexpr std::tuple kStepFields{
     ReportField{"min_volume_ratio", &StepReport::min_volume_ratio, AddUp::least, "", everywhere},
     ReportField{"history_loss", &StepReport::history_loss, AddUp::sum, "J", everywhere},
     ReportField{"viscous_dissipation", &StepReport::viscous_dissipation, AddUp::sum, "J", everywhere | if_any},
+    ReportField{"softening", &StepReport::softening, AddUp::sum, "J", everywhere | if_any},
     ReportField{"wetted", &StepReport::wetted, AddUp::last, "", everywhere | if_any},
     ReportField{"leaks", &StepReport::leaks, AddUp::last, "", everywhere | if_any},
     ReportField{"indefinite", &StepReport::indefinite, AddUp::sum, "", in_files},

@@ -195,6 +195,12 @@ void check_materials(const Setup<Dim>& setup) {
       relaxed += term.g;
     }
     require(relaxed < 1, place + "/prony/g", relaxed, "shares of a sum below 1");
+    if (const auto& mullins = material.mullins) {
+      require(std::isfinite(mullins->r) && mullins->r > 1, place + "/mullins/r", mullins->r, "a number > 1");
+      require_not_negative(place + "/mullins/m", mullins->m);
+      require_not_negative(place + "/mullins/beta", mullins->beta);
+      require(mullins->m + mullins->beta > 0, place + "/mullins/m", mullins->m, "a number > 0 where beta is 0");
+    }
   }
 }
 

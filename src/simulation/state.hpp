@@ -6,6 +6,7 @@
 
 #include "energy/contact/stiffness.hpp"
 #include "energy/elastic/elastic.hpp"
+#include "energy/softening.hpp"
 #include "energy/viscous.hpp"
 #include "fem/chord_levels.hpp"
 #include "itr/simulation.hpp"

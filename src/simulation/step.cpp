@@ -146,6 +146,7 @@ class StepSolver {
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
     if (next_.history.viscous) end_viscous(start);
+    if (next_.history.softening) end_softening(start);
     if (setup_.contact.enabled) tell_of_closed_faces();
     if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
@@ -363,6 +364,17 @@ class StepSolver {
     auto end = viscous_step(setup_, next_.history, next_.t)->end(next_.mesh, x_, next_.t);
     next_.history.viscous = std::move(end.state);
     report_.viscous_dissipation = end.dissipation;
+    report_.history_loss += end.loss;
+  }
+
+  /// Lets the step's largest densities soften bodies; `start` as above.
+  void end_softening(State<Dim>* start) {
+    const auto step = softening_step(setup_, next_.history);
+    if (start && !renumbering_.empty())
+      start->history.softening = step->end(next_.mesh, next_.history.x[0], before_.t).state;
+    auto end = step->end(next_.mesh, x_, next_.t);
+    next_.history.softening = std::move(end.state);
+    report_.softening = end.dissipation;
     report_.history_loss += end.loss;
   }
 

@@ -290,6 +290,7 @@ EnergyReport StepProblem<Dim>::report(const VectorX& x) {
     entry_of(report, traits<Dim>(kind).energy) += term->value(x, workspace_) / terms_.scaling;
   });
   if (terms_.viscous) report.elastic += terms_.viscous->stored_excess(cells_, x);
+  if (terms_.softening) report.elastic -= terms_.softening->lost(cells_, x);
   for (std::size_t i = 0; i < kNumEnergyEntries; ++i) report.total += entry_of(report, static_cast<EnergyEntry>(i));
   return report;
 }

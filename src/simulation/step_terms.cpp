@@ -9,6 +9,7 @@
 #include <limits>
 #include <utility>
 
+#include "energy/softening.hpp"
 #include "energy/support.hpp"
 #include "energy/viscous.hpp"
 #include "itr/core.hpp"
@@ -154,6 +155,12 @@ std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup
 }
 
 template <int Dim>
+std::shared_ptr<const SofteningStep<Dim>> softening_step(const StepSetup<Dim>& setup, const History& history) {
+  const auto start = std::dynamic_pointer_cast<const SofteningField<Dim>>(history.softening);
+  return start ? std::make_shared<SofteningStep<Dim>>(start, setup.materials) : nullptr;
+}
+
+template <int Dim>
 PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& history, double t, bool is_axisymmetric) {
   const TimeIntegrator integrator(setup.time);
   std::map<int, Material> materials = materials_at(setup, t);
@@ -166,6 +173,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   });
   return {.materials = std::move(materials),
           .viscous = viscous,
+          .softening = softening_step<Dim>(setup, history),
           .loads = loads_at(setup, t),
           .has_inertia = setup.time.has_inertia(),
           .axisymmetric = is_axisymmetric,
@@ -186,6 +194,7 @@ PotentialTerms<Dim> potential_terms(const StepSetup<Dim>& setup, const History& 
   template std::map<int, Material> materials_at<Dim>(const StepSetup<Dim>&, double);                                 \
   template PotentialTerms<Dim> potential_terms<Dim>(const StepSetup<Dim>&, const History&, double, bool);            \
   template std::shared_ptr<const ViscousStep<Dim>> viscous_step<Dim>(const StepSetup<Dim>&, const History&, double); \
+  template std::shared_ptr<const SofteningStep<Dim>> softening_step<Dim>(const StepSetup<Dim>&, const History&);     \
   template ConditionsByTag<Dim> conditions_by_tag<Dim>(const StepSetup<Dim>&);                                       \
   template HeldRule<Dim>::Components held_components<Dim>(const StepSetup<Dim>&);                                    \
   template HeldDofs<Dim> held_dofs<Dim>(const StepSetup<Dim>&, const Mesh<Dim>&, double);                            \

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "energy/mortar.hpp"
+#include "energy/softening.hpp"
 #include "energy/terms.hpp"
 #include "energy/viscous.hpp"
 #include "fem/held_rule.hpp"
@@ -26,6 +27,10 @@ std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t);
 /// all that relaxes has done so.
 template <int Dim>
 std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup, const History& history, double t);
+
+/// The step of softening bodies; null where there are none.
+template <int Dim>
+std::shared_ptr<const SofteningStep<Dim>> softening_step(const StepSetup<Dim>& setup, const History& history);
 
 /// Terms that act in the step that ends at time t, as every scope of it sees them.
 template <int Dim>

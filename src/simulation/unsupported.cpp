@@ -162,6 +162,13 @@ constexpr Check<Dim> kChecks[] = {
          return !e.second.prony.empty() && !why_not_viscous(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim).empty();
        });
      }},
+    {{"/materials/*/mullins",
+      "softening beside prony, in plane stress, or of a law of which no part is known to be isochoric"},
+     [](const Setup<Dim>& setup, bool) {
+       return std::ranges::any_of(setup.materials, [&](const auto& e) {
+         return e.second.mullins && !why_not_softening(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim).empty();
+       });
+     }},
     {{"/geometry/*/rigid", "a rigid body in an axisymmetric scene"},
      [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && has_rigid_bodies(setup.materials); }},
     {{"/geometry/*/rigid", "a rigid body with quadratic elements (discr_order 2 of its id)"},
@@ -179,10 +186,10 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool) {
        return setup.consistent_initial_acceleration && has_rigid_bodies(setup.materials);
      }},
-    {{"/shapes", "shapes where bodies are viscoelastic: their state has none for new material"},
+    {{"/shapes", "shapes where bodies are viscoelastic or soften: their state has none for new material"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && !setup.shapes.empty() &&
-              std::ranges::any_of(setup.materials, [](const auto& e) { return !e.second.prony.empty(); });
+              std::ranges::any_of(setup.materials, [](const auto& e) { return has_memory(e.second); });
      }},
     {{"/materials", "a density that varies in space where the mesh changes"},
      [](const Setup<Dim>& setup, bool) {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/viscous_history.hpp"
+#include "core/cell_history.hpp"
 #include "itr/options.hpp"
 #include "itr/types.hpp"
 
@@ -21,7 +21,8 @@ struct History {
   double dt = 0;           ///< of the step that led to x[0] [s]; 0: as long as the next one
   /// Newmark only: the next step is one of implicit Euler, which dissipates (see TimeOptions::energy_growth_limit).
   bool damp_next = false;
-  std::shared_ptr<const ViscousHistory> viscous{};  ///< null: no body is viscoelastic
+  std::shared_ptr<const CellHistory> viscous{};    ///< null: no body is viscoelastic
+  std::shared_ptr<const CellHistory> softening{};  ///< null: no body softens
 };
 
 /// Requirement on the length of a step, whose square enters energies; and whether a number meets it.

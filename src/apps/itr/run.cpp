@@ -256,7 +256,7 @@ class Unlocked {
 template <int Dim>
 bool depends_on_path(const Setup<Dim>& setup) {
   return setup.contact.has_friction() || setup.contact.adhesion.tangential_coefficient > 0 || !setup.damping.empty() ||
-         std::ranges::any_of(setup.materials, [](const auto& entry) { return !entry.second.prony.empty(); });
+         std::ranges::any_of(setup.materials, [](const auto& entry) { return has_memory(entry.second); });
 }
 
 template <int Dim>

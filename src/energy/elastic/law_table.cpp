@@ -141,7 +141,7 @@ const std::vector<LawRow>& rows() {
   static const std::vector<LawRow> all = {
       {"Yeoh", {list("C"), kBulk}, add_yeoh},
       {"Ogden", {list("mus"), list("alphas", Range::not_zero), kBulk}, add_ogden},
-      {"ArrudaBoyce", {{"mu", Range::positive}, {"lambda_m", Range::positive}, kBulk}, add_arruda_boyce},
+      {"ArrudaBoyce", {{"mu", Range::positive}, {"lambda_m", Range::above_one}, kBulk}, add_arruda_boyce},
       {"IsochoricMooneyRivlin", {{"c1", Range::any}, {"c2", Range::any}, kBulk}, add_mooney_rivlin},
       {"Hyperfoam", {list("mus"), list("alphas", Range::not_zero), list("nus", Range::compressible)}, add_hyperfoam},
       {"Hencky", {{"lambda", Range::any}, {"mu", Range::positive}}, add_hencky, nullptr, true},
@@ -233,6 +233,13 @@ std::string why_not_viscous(const Material& material, int dim) {
       return std::string(type) + " in a law, which has no isochoric part; IsochoricNeoHookean, Yeoh and Ogden have one";
   }
   return "";
+}
+
+std::string why_not_softening(const Material& material, int dim) {
+  if (!material.prony.empty()) return "a material that is viscoelastic (prony)";
+  if (material.law != MaterialLaw::own && material.law != MaterialLaw::mooney_rivlin)
+    return "a law without an isochoric part; IsochoricNeoHookean, Yeoh and Ogden have one";
+  return why_not_viscous(material, dim);
 }
 
 RestModuli rest_moduli(const LawSum& sum) {

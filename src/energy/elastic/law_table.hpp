@@ -19,7 +19,7 @@ class StretchResponse;
 
 /// A coefficient of a law, or a list of them.
 struct LawCoefficient {
-  enum class Range { any, positive, not_zero, share, third, compressible };
+  enum class Range { any, positive, not_zero, share, third, compressible, above_one };
 
   const char* key;
   Range range;
@@ -90,6 +90,9 @@ bool is_nearly_incompressible(const Material& material, int dim);
 
 /// Why a material of bodies in `dim` dimensions (3 where they are turned) cannot be viscoelastic; empty: it can.
 std::string why_not_viscous(const Material& material, int dim);
+
+/// The same of Mullins' softening, which takes a part that is isochoric.
+std::string why_not_softening(const Material& material, int dim);
 
 /// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
 Material material_of(const LawSum& sum, int dim);
