@@ -106,7 +106,6 @@ void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh) {
   for (const auto& mortar : mortars_of(setup, mesh, cells))
     if (!setup.ties[mortar.tie].jump)
       for (const VertexId v : mortar.vertices) mesh.set_steps_apart(v, 0);
-  if (!setup.contact.enabled) return;
   std::vector<char> bonded(mesh.num_vertices(), 0);
   for (VertexId v = 0; v < mesh.num_vertices(); ++v) bonded[v] = mesh.steps_apart(v) == 0;
   const std::vector<char> all(mesh.num_nodes(), 1);
@@ -136,7 +135,7 @@ template <int Dim>
 void open_faces(const StepSetup<Dim>& setup, const ChordLevels& chords, const VectorX& x, Mesh<Dim>& mesh) {
   std::vector<char> stay = tied_vertices(setup, mesh);
   if (has_closed_faces(mesh) && !has_only_tied_faces(setup, mesh)) {
-    const double dhat = setup.contact.dhat;
+    const double dhat = setup.contact.enabled ? setup.contact.dhat : setup.contact.reach_of_closed();
     const auto visit = [&](PairKind kind, const std::array<int, 4>& vertices) {
       if (pair_distance_squared<Dim>(kind, gather<Dim>(vertices, pair_size(kind), x).data()) >= dhat * dhat) return;
       for (int k = 0; k < pair_size(kind); ++k) for_each_vertex_of_node(mesh, vertices[k], [&](VertexId v) { stay[v] = 1; });

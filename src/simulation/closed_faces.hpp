@@ -21,8 +21,8 @@ bool has_closed_faces(const Mesh<Dim>& mesh, int age = 0);
 template <int Dim>
 double coincidence(const Mesh<Dim>& mesh);
 
-/// Closes the faces that ties bond, and with contact those of bodies that coincide at rest; does nothing where a proxy
-/// touches in their place.
+/// Closes the faces that ties bond, and those of bodies that coincide at rest; does nothing where a proxy touches in their
+/// place.
 template <int Dim>
 void close_coincident_faces(const StepSetup<Dim>& setup, Mesh<Dim>& mesh);
 

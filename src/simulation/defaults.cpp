@@ -297,6 +297,18 @@ double tie_reach(const Setup<Dim>& setup) {
   return kByEdge * longest;
 }
 
+/// How far faces that coincide at rest may overlap where there is no contact: by what d-hat would be in dynamics [m].
+template <int Dim>
+double reach_without_contact(const Setup<Dim>& setup) {
+  Mesh<Dim> mesh = initial_mesh(setup);
+  close_coincident_faces(setup, mesh);
+  if (!has_closed_faces(mesh)) return 0;
+  Setup<Dim> moving = setup;
+  moving.time.is_static = moving.time.quasistatic = false;
+  choose_dhat(moving, moving.contact);
+  return moving.contact.dhat;
+}
+
 /// Chooses the split tolerance [J], and says so.
 template <int Dim>
 std::string choose_split_tolerance(Setup<Dim>& setup, RemeshOptions& remesh) {
@@ -368,6 +380,7 @@ std::vector<std::string> Setup<Dim>::choose_defaults() {
   if (has_rigid_bodies(this->materials)) choose_rigid_moduli(*this);
   if (contact.adaptive_stiffness && contact.barrier_stiffness == 0) contact.barrier_stiffness = 1;
   if (contact.enabled && contact.dhat == 0) words.push_back(choose_dhat(*this, contact));
+  if (!contact.enabled && contact.dhat == 0) contact.tie_reach = std::max(contact.tie_reach, reach_without_contact(*this));
   if (contact.may_average_gaps) contact.average_gaps = averaging_helps(*this);
   if (contact.enabled && contact.average_gaps)
     if (std::string chosen = retract_surfaces(*this); !chosen.empty()) words.push_back(std::move(chosen));

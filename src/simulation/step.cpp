@@ -151,7 +151,7 @@ class StepSolver {
     if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
     TimeIntegrator(setup_.time).push(std::move(x_), increment, next_.history);
-    if (setup_.contact.enabled) open_faces(setup_, next_.chords, next_.history.x[0], next_.mesh);
+    open_faces(setup_, next_.chords, next_.history.x[0], next_.mesh);
     next_.chords = lowered_chords<Dim>(setup_, next_.mesh, next_.chords, next_.history.x);
     after = std::move(next_);  // before_ may be the same, and is not needed any more
     clock_.tell(report_);
