@@ -385,6 +385,30 @@ TEST(Resolution, WithoutInertiaIsNoMatterOfAVelocity) {
   EXPECT_TRUE(found.empty());
 }
 
+/// A stiff body that flies has no strain, and moves far.
+TEST(Resolution, IsNoMatterOfStrainsThatAFlightHasNot) {
+  const auto count = [](double modulus, bool is_held, bool has_ground) {
+    auto setup = plain_square(1, modulus);
+    setup.materials[1].density = 1;
+    setup.body_acceleration = [](const Vec<2>&, double) { return Vec<2>(0, -10); };
+    setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(1e-3, 0); }});
+    if (is_held) hold(setup, 1);
+    if (has_ground) {
+      setup.contact.enabled = true;
+      setup.obstacles.rest = {{-9, -1}, {9, -1}};
+      setup.obstacles.edges = {{0, 1}};
+    }
+    setup.time.dt = 1e-2;
+    linear::Registry registry;
+    std::vector<std::string> found;
+    cli::find_unresolved(Simulation<2>(setup, registry), found);
+    return found.size();
+  };
+  EXPECT_EQ(count(1e16, false, false), 0u);
+  EXPECT_EQ(count(1e16, true, false), 1u) << "gravity strains it by 1e-15";
+  EXPECT_EQ(count(1e16, false, true), 1u) << "it lands";
+}
+
 /// Over short steps the positions have no digits for the accelerations that belong to reactions.
 TEST(Reactions, ThatPositionsDoNotResolveAreSaid) {
   for (const double dt : {1e-11, 1e-3}) {

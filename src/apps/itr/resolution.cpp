@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "energy/energy.hpp"
 #include "energy/rigid_body.hpp"
@@ -27,6 +28,7 @@ struct Actions {
   double motion = 0;        ///< prescribed, in a step [m]
   double displacement = 0;  ///< prescribed [m]
   double acceleration = 0;  ///< [m/s^2]
+  double tide = 0;          ///< differences of accelerations [m/s^2]
   double traction = 0;      ///< [Pa]
   double force = 0;         ///< on a node [N]
   double eigenstrain = 0;
@@ -103,7 +105,11 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   add_eigenstrains(setup, t, actions);
   add_moves(setup, std::max(setup.time.t0, t - setup.time.dt), t, actions);
   for (VertexId v = 0; v < mesh.node_slots(); ++v)
-    if (setup.body_acceleration) raise(actions.acceleration, setup.body_acceleration(mesh.point(v), t).norm());
+    if (setup.body_acceleration) {
+      const Vec<Dim> here = setup.body_acceleration(mesh.point(v), t);
+      raise(actions.acceleration, here.norm());
+      raise(actions.tide, (here - setup.body_acceleration(mesh.point(0), t)).norm());
+    }
   for (const FacetId f : mesh.live_facets()) {
     const RestPoint<Dim> X = mesh.point(mesh.facet(f)[0]);
     for (const auto& condition : setup.neumann)
@@ -117,6 +123,25 @@ void add_loads(const Setup<Dim>& setup, double t, Actions& actions) {
   }
 }
 
+/// Whether nothing holds the bodies, and they have nothing to touch: what is the same all over them does not strain them.
+template <int Dim>
+bool are_in_flight(const Setup<Dim>& setup) {
+  const Mesh<Dim>& mesh = setup.mesh;
+  if (!setup.time.has_inertia() || !setup.dirichlet.empty() || !setup.nodal_loads.empty()) return false;
+  if (!setup.contact.enabled) return true;
+  std::set<int> parts;
+  for (const CellId c : mesh.live_cells()) parts.insert(mesh.part(c));
+  return parts.size() <= 1 && setup.obstacles.rest.empty();
+}
+
+/// The largest difference of two vertices of a field [as that].
+template <int Dim>
+double spread_of(const VectorX& field) {
+  double spread = 0;
+  for (Eigen::Index i = 0; i < field.size(); i += Dim) raise(spread, (field.segment<Dim>(i) - field.segment<Dim>(0)).norm());
+  return spread;
+}
+
 }  // namespace
 
 template <int Dim>
@@ -125,8 +150,11 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   const TimeOptions& time = setup.time;
   const History& history = simulation.state().history;
   Actions actions, first;
-  if (time.has_inertia() && !history.v.empty() && history.v[0].size() > 0)
+  double spread = 0;  // of speeds
+  if (time.has_inertia() && !history.v.empty() && history.v[0].size() > 0) {
     actions.speed = history.v[0].template lpNorm<Eigen::Infinity>();
+    spread = spread_of<Dim>(history.v[0].head(Dim * simulation.state().mesh.num_nodes()));
+  }
   add_loads(setup, time.time_after(time.first_step + 1), actions);
   first = actions;
   if (time.steps > 1) add_loads(setup, time.time_after(time.steps), actions);
@@ -137,15 +165,17 @@ void find_unresolved(const Simulation<Dim>& simulation, std::vector<std::string>
   const double spacing = kSpacing * farthest;
   double motion = actions.motion, strain = 0;
   if (!first.is_any()) first = actions;
+  const bool fly = are_in_flight(setup);
+  const double straining = fly ? actions.tide : actions.acceleration, impact = fly ? spread : actions.speed;
   for (const auto& [body, size] : body_sizes(setup.mesh)) {
     const Material& material = setup.materials.at(body);
     if (rigid_body_of(material)) continue;
     const double length = size.diagonal;
     const auto traction = [length](const Actions& of) { return of.traction + of.force / std::pow(length, Dim - 1); };
-    const double stress = traction(actions) + material.density * actions.acceleration * length;
+    const double stress = traction(actions) + material.density * straining * length;
     const double of_load = stress / material.youngs_modulus;
     strain = std::max({strain, of_load, actions.displacement / length, actions.eigenstrain,
-                       actions.speed / std::sqrt(material.youngs_modulus / material.density)});
+                       impact / std::sqrt(material.youngs_modulus / material.density)});
     const double at_rest =
         ((traction(first) + material.density * first.acceleration * length) / material.youngs_modulus + first.eigenstrain) *
         length;
