@@ -189,6 +189,36 @@ void expect_one_least(const Mesh<Dim>& mesh, const std::array<bool, 3>& rotation
   }
 }
 
+/// A point that has come far has the round-off of the way since rest, however short the step is: its value is noisy by that.
+template <int Dim>
+void expect_round_off(const Mesh<Dim>& mesh) {
+  constexpr double kFar = 1e3, kStep = 1e-9;
+  constexpr int kSamples = 50;
+  const CellSet<Dim> cells = whole_mesh(mesh, {});
+  const SurfaceMean<Dim> mean(cells, std::vector<int>{3});
+  PointTerms<Dim> terms;
+  terms.stiffness.setIdentity();
+  terms.origin.setConstant(kFar + kStep);
+  const CouplingEnergy<Dim> energy(CoupledPoint<Dim>(mean, Vec<3>::Zero()), terms, {}, 1);
+  const VectorX base = (itr::rest_positions<Dim>(cells).array() + kFar).matrix(),
+                way = VectorX::Constant(base.size(), kStep);
+  Workspace workspace;
+  const auto value = [&](double part) { return energy.value_at({base, VectorX(part * way)}, workspace); };
+  double noise = 0;
+  for (int k = 1; k < kSamples; ++k) {
+    const double part = 0.5 * k / kSamples, between = 1e-3;
+    noise = std::max(noise, std::abs(value(part + between) - 2 * value(part) + value(part - between)));
+  }
+  const double curvature = Dim * 1e-6 * kStep * kStep;
+  EXPECT_GT(noise, 10 * curvature) << "nothing is tested";
+  EXPECT_LE(noise, 8 * energy.value_round_off_at({base, VectorX(0.25 * way)}, workspace));
+}
+
+TEST(CouplingEnergy, TellsTheRoundOffOfTheWaySinceRest) {
+  expect_round_off(block_with_sides<2>());
+  expect_round_off(block_with_sides<3>());
+}
+
 TEST(CouplingEnergy, HasOneLeastWhereTurnsAreHeld) {
   expect_one_least(block_with_sides<2>(), {false, false, true});
   for (const std::array<bool, 3> held :

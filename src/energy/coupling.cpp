@@ -11,6 +11,7 @@
 
 #include "energy/facet_shapes.hpp"
 #include "energy/project_block.hpp"
+#include "energy/round_off.hpp"
 #include "fem/cell_set.hpp"
 
 namespace itr {
@@ -184,6 +185,27 @@ double CouplingEnergy<Dim>::value_of(const MatrixX& U) const {
   return scale_ * sum;
 }
 
+/// Forces that work along displacements since rest, which may be large beside those of the step, and along turns.
+template <int Dim>
+double CouplingEnergy<Dim>::value_round_off_at(const Increment& at, Workspace& workspace) const {
+  const MatrixX U = displacements_at(at);
+  const Means means = point_.means_of(U);
+  const Mat<3> R = point_.rotation(means).R();
+  const Open open = open_at(U, means, R);
+  const double way = U.colwise().norm().maxCoeff(), arms = arms_.colwise().norm().maxCoeff();
+  const Vec<Dim> off = point_.displacement(means, R) - terms_.origin;
+  const double forces = terms_.force.norm() + (terms_.stiffness * off).norm() + multiplier_.position.norm() +
+                        held_.stiffness * open.position.norm();
+  const double moments = terms_.couple.norm() + std::abs(terms_.moment) + multiplier_.rotation.norm() +
+                         rotation_stiffness() * (open.rotation.norm() +
+                                                 ((R - held_.turned) * parts_of_axes(held_.rotation).asDiagonal()).norm());
+  double work = forces * (way + point_.arm().norm()) + std::numbers::pi * moments;
+  if (held_.is_rigid)
+    work += (multiplier_.nodes.colwise().norm().sum() + held_.stiffness * open.nodes.colwise().norm().sum()) * (way + arms) /
+            static_cast<double>(U.cols());
+  return IncrementalTerm::value_round_off_at(at, workspace) + kEpsilon * scale_ * work;
+}
+
 template <int Dim>
 typename CouplingEnergy<Dim>::Forces CouplingEnergy<Dim>::forces_at(const MatrixX& U) const {
   const Means means = point_.means_of(U);
@@ -318,7 +340,8 @@ double CouplingEnergy<Dim>::error_at(const Increment& at) const {
   const Means means = point_.means_of(U);
   const Open open = open_at(U, means, point_.rotation(means).R());
   const double radius = std::sqrt(mean_.moments.trace());
-  if (largest_open(open) <= kRoundOff * (radius + mean_.rest.cwiseAbs().maxCoeff())) return 0;
+  const double extent = std::max(mean_.rest.cwiseAbs().maxCoeff(), at.base.lpNorm<Eigen::Infinity>());
+  if (largest_open(open) <= kRoundOff * (radius + extent)) return 0;
   const auto size = [&](const Open& forces) {
     const double of_nodes = forces.nodes.size() > 0 ? forces.nodes.colwise().norm().maxCoeff() : 0;
     return std::max({forces.position.norm(), forces.rotation.norm() / radius, of_nodes});

@@ -97,6 +97,7 @@ class CouplingEnergy final : public Energy, public IncrementalTerm, public Const
   void add_gradient_at(const Increment& at, VectorView gradient, Workspace&) const override {
     add_gradient_of(displacements_at(at), gradient);
   }
+  double value_round_off_at(const Increment& at, Workspace& workspace) const override;
   double error_at(const Increment& at) const override;
   void update(const Increment& at) override;
   void stiffen(double factor) override { held_.stiffness *= factor; }

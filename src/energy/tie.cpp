@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kStiffness = 1e4;     ///< of a tie by that of the cells beside it
 constexpr double kLargestRatio = 1e3;  ///< of the stiffness at constant width to Young's modulus, which ties follow
-constexpr double kRoundOff = 1e-13;    ///< of the positions: smaller gaps are none
+constexpr double kRoundOff = 1e-13;    ///< of the positions, at rest and now: smaller gaps are none
 
 /// The stiffness by volume that a row's condition works against, of the softer side [N/m^Dim].
 template <int Dim>
@@ -194,7 +194,8 @@ double TieEnergy<Dim>::error_at(const Increment& at) const {
     error = std::max(error, (now - row.multiplier).norm());
     open = std::max(open, g.norm() / row.of->measure);
   }
-  return open <= kRoundOff * extent_ || largest == 0 ? 0 : error / largest;
+  const double extent = std::max(extent_, at.base.lpNorm<Eigen::Infinity>());
+  return open <= kRoundOff * extent || largest == 0 ? 0 : error / largest;
 }
 
 template <int Dim>
