@@ -367,6 +367,12 @@ TEST(Cavity, RefusesSurfacesThatDoNotCloseAroundOne) {
       break;
     }
   EXPECT_NE(refusal(open).find("does not close: it ends at ("), std::string::npos) << refusal(open);
+  EXPECT_TRUE(refusal(open).ends_with(") m")) << refusal(open);
+  const std::string in_m = refusal(open);
+  open.units = Units("mm", "g", "s");
+  EXPECT_TRUE(refusal(open).ends_with(") mm")) << refusal(open);
+  const auto number_of = [](const std::string& text) { return std::stod(text.substr(text.find('(') + 1)); };
+  EXPECT_NEAR(number_of(refusal(open)), 1e3 * number_of(in_m), 1e-2 * number_of(in_m));
   itr::Setup<2> vacuum = setup;
   vacuum.cavities[0].pressure = [](double) { return -2.0; };
   linear::Registry registry;

@@ -238,7 +238,8 @@ void check_cavities(const Setup<Dim>& setup) {
     require_not_negative(place + "/external_pressure", cavity.external_pressure);
     if (const VertexId end = find_rim(setup.mesh, cavity.surfaces); end != kNone)
       refuse(place + "/id",
-             fmt::format("a surface that does not close: it ends at ({:.6g}) m", fmt::join(setup.mesh.rest(end), ", ")),
+             fmt::format("a surface that does not close: it ends at {} {}",
+                         point_text<Dim>(setup.mesh.rest(end), setup.units, 6), setup.units.length()),
              "surfaces that close around the cavity");
     const double volume = CavityEnergy<Dim>(cells, CavityLoad{cavity.surfaces}, 1).volume(rest);
     if (!(volume > 0))
@@ -334,30 +335,74 @@ void check_near(const Setup<Dim>& setup, const Locator<Dim>& locator, const Vec<
                     "a point of a body at rest; the nearest one is " + text(nearest)});
 }
 
-/// Refuses points at places that two connected parts share, of which either may move away. Where there are ties,
-/// which may hold them together, nothing is asked.
+/// A connected part at a place: a cell of it there, and the tags of its surface there.
+struct PartAt {
+  CellId cell;
+  std::set<int> tags;
+
+  bool has_any(const std::vector<int>& of) const {
+    return std::ranges::any_of(of, [&](int tag) { return tags.contains(tag); });
+  }
+};
+
+template <int Dim>
+std::vector<PartAt> parts_at(const Mesh<Dim>& mesh, const Vec<Dim>& X) {
+  constexpr double kRoundOff = 1e-9;
+  std::map<int, PartAt> parts;
+  for (const CellId c : mesh.live_cells()) {
+    const auto& cell = mesh.cell(c);
+    const auto weights = barycentric_weights<Dim>(mesh.rest(cell[0]), mesh.inverse_rest_edges(c), X);
+    if (*std::ranges::min_element(weights) < -kRoundOff) continue;
+    PartAt& part = parts.try_emplace(mesh.part(c), PartAt{c, {}}).first->second;
+    for (const VertexId v : cell)
+      for (const FacetId f : mesh.facets_of(v)) {
+        if (cell_of_facet(mesh, f) != c) continue;
+        bool is_there = true;
+        for (int k = 0; k <= Dim; ++k) is_there = is_there && (weights[k] <= kRoundOff || holds(mesh.facet(f), cell[k]));
+        if (is_there) part.tags.insert(mesh.facet_tag(f));
+      }
+  }
+  std::vector<PartAt> found;
+  for (auto& [number, part] : parts) found.push_back(std::move(part));
+  return found;
+}
+
+/// The first of parts at a place that ties do not bond to the first one there, by others or not; kNone: there is none.
+CellId find_loose(std::vector<PartAt> parts, const std::vector<Tie>& ties) {
+  if (parts.empty()) return kNone;
+  std::vector<PartAt> bonded{parts.front()};
+  parts.erase(parts.begin());
+  for (std::size_t i = 0; i < bonded.size(); ++i)
+    for (const Tie& tie : ties) {
+      if (tie.jump) continue;
+      for (const auto& [own, other] : {std::pair{&tie.a, &tie.b}, std::pair{&tie.b, &tie.a}}) {
+        if (!bonded[i].has_any(*own)) continue;
+        const auto rest =
+            std::stable_partition(parts.begin(), parts.end(), [&](const PartAt& p) { return !p.has_any(*other); });
+        bonded.insert(bonded.end(), rest, parts.end());
+        parts.erase(rest, parts.end());
+      }
+    }
+  return parts.empty() ? kNone : parts.front().cell;
+}
+
+/// Refuses points at places that two connected parts share, of which either may move away.
 template <int Dim>
 void check_points(const Setup<Dim>& setup) {
-  constexpr double kRoundOff = 1e-9;
   if (setup.fields.points.empty()) return;
   const Mesh<Dim>& mesh = setup.mesh;
   const Locator<Dim> locator(mesh);
   for (std::size_t i = 0; i < setup.fields.points.size(); ++i) {
     const Vec<Dim> X(setup.fields.points[i].rest.data());
     check_near(setup, locator, X, i);
-    if (!setup.ties.empty()) continue;
-    CellId first = kNone;
-    for (const CellId c : mesh.live_cells()) {
-      const auto weights = barycentric_weights<Dim>(mesh.rest(mesh.cell(c)[0]), mesh.inverse_rest_edges(c), X);
-      if (*std::ranges::min_element(weights) < -kRoundOff) continue;
-      if (first == kNone) first = c;
-      if (mesh.part(c) == mesh.part(first)) continue;
-      const auto name = [&](CellId of) { return set_text(setup.names.bodies, mesh.body(of)); };
-      throw InputError({"", fmt::format("/output/points/{}/rest", i),
-                        fmt::format("{} {}, where bodies {} and {} both are", point_text<Dim>(X, setup.units, 6),
-                                    setup.units.length(), name(first), name(c)),
-                        "a place of one body, such as one a little inside of it"});
-    }
+    const std::vector<PartAt> parts = parts_at(mesh, X);
+    const CellId loose = find_loose(parts, setup.ties);
+    if (loose == kNone) continue;
+    const auto name = [&](CellId of) { return set_text(setup.names.bodies, mesh.body(of)); };
+    throw InputError({"", fmt::format("/output/points/{}/rest", i),
+                      fmt::format("{} {}, where bodies {} and {} both are", point_text<Dim>(X, setup.units, 6),
+                                  setup.units.length(), name(parts.front().cell), name(loose)),
+                      "a place of one body, such as one a little inside of it"});
   }
 }
 
@@ -504,7 +549,8 @@ void Setup<Dim>::validate() const {
   if (mesh.is_axisymmetric())
     for (const VertexId v : mesh.live_vertices())
       if (!(mesh.rest(v)[0] >= 0))
-        refuse("mesh", fmt::format("vertex {} at r = {:g} m", v, mesh.rest(v)[0]), "r >= 0 in an axisymmetric scene");
+        refuse("mesh", fmt::format("vertex {} at r = {}", v, this->units.text(mesh.rest(v)[0], "m", 6)),
+               "r >= 0 in an axisymmetric scene");
   check_materials(*this);
   check_proxy(*this);
   check_cavities(*this);
