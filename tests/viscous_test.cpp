@@ -131,6 +131,26 @@ void expect_energy_with_derivatives(Mesh<Dim> mesh, Material material) {
   expect_psd(energy, x);
 }
 
+TEST(Viscous, EnergyOfBodiesThatGrowHasDerivatives) {
+  const auto growing = [](Material material) {
+    material.eigenstrain_varies = true;
+    material.eigenstrain = [](const Vec<3>& X, double) {
+      Mat<3> strain = 0.1 * Mat<3>::Identity();
+      strain(0, 1) = strain(1, 0) = 0.1 * X[0];
+      return strain;
+    };
+    return material;
+  };
+  for (const int law : {0, 1, 4}) {
+    Mesh<2> square = make_square(2, 1);
+    expect_energy_with_derivatives(square, growing(viscous_laws<2>()[law]));
+    square.set_curved_edges(square.edges());
+    square.set_axisymmetric(true);
+    expect_energy_with_derivatives(square, growing(viscous_laws<3>()[law]));
+    expect_energy_with_derivatives(body<3>(1), growing(viscous_laws<3>()[law]));
+  }
+}
+
 TEST(Viscous, EnergyHasDerivativesOnAllCells) {
   for (const int law : {0, 1, 4}) {
     Mesh<2> square = make_square(2, 1);
@@ -169,6 +189,77 @@ TEST(Viscous, StepOfStrainRelaxesAsTheSeries) {
   for (const Material& material : viscous_laws<3>()) expect_relaxation<3>(material, 1);
   expect_relaxation<2>(viscous_laws<2>()[4], 2);
   expect_relaxation<3>(viscous_laws<3>()[5], 2);
+}
+
+/// A stretch that keeps the volume, of axes that turn.
+template <int Dim>
+Mat<Dim> stretched(double t) {
+  Mat<Dim> stretch = Mat<Dim>::Identity(), turn = Mat<Dim>::Identity();
+  stretch(0, 0) = std::exp(0.3 * std::sin(t));
+  stretch(1, 1) = 1 / stretch(0, 0);
+  turn.template topLeftCorner<2, 2>() = Eigen::Rotation2Dd(0.4 * t).toRotationMatrix();
+  return turn * stretch * turn.transpose();
+}
+
+/// The law sees the strain beyond the eigenstrain, past and present: a body that is held while it grows is as one that does
+/// not grow and moves the other way.
+template <int Dim>
+void expect_growth_to_be_as_motion(Material material) {
+  const bool is_small = material.law == MaterialLaw::linear;
+  linear::Registry registry;
+  Simulation<Dim> moving(driven<Dim>(material, stretched<Dim>, 0.35, 5), registry);
+  material.eigenstrain = [is_small](const Vec<3>&, double t) {
+    Mat<3> F = Mat<3>::Identity();
+    F.topLeftCorner<Dim, Dim>() = stretched<Dim>(t);
+    return is_small ? Mat<3>(Mat<3>::Identity() - F) : Mat<3>(F.inverse() - Mat<3>::Identity());
+  };
+  Simulation<Dim> held(driven<Dim>(
+                           material, [](double) { return Mat<Dim>(Mat<Dim>::Identity()); }, 0.35, 5),
+                       registry);
+  const double modulus = material.lame_mu();
+  for (int k = 1; k <= 5; ++k) {
+    const StepReport one = advance(moving).report, other = advance(held).report;
+    const Mat<Dim> F = stretched<Dim>(0.35 * k);
+    const Mat<Dim> expected =
+        is_small ? Mat<Dim>(stress_in(moving) * F.determinant() * F.inverse().transpose()) : stress_in(moving);  // P
+    EXPECT_LE((stress_in(held) - expected).norm(), 1e-7 * modulus) << name_of(material) << ", step " << k;
+    EXPECT_NEAR(other.energy.elastic, one.energy.elastic, 1e-8 * modulus) << name_of(material) << ", step " << k;
+    EXPECT_NEAR(other.viscous_dissipation, one.viscous_dissipation, 1e-8 * modulus) << name_of(material) << ", step " << k;
+    EXPECT_GT(other.viscous_dissipation, 1e-6 * modulus);
+  }
+}
+
+TEST(Viscous, BodiesThatGrowAreAsBodiesThatMove) {
+  for (const Material& material : viscous_laws<2>()) expect_growth_to_be_as_motion<2>(material);
+  for (const Material& material : viscous_laws<3>()) expect_growth_to_be_as_motion<3>(material);
+}
+
+/// What grows freely has no stress and no past, whether it grows at once or by and by.
+template <int Dim>
+void expect_free_growth(Material material, bool at_once) {
+  material.eigenstrain = [at_once](const Vec<3>&, double t) {
+    Mat<3> strain = Mat<3>::Zero();
+    strain.diagonal() << 0.2, -0.05, Dim == 3 ? 0.1 : 0;
+    strain(0, 1) = strain(1, 0) = 0.03;
+    return Mat<3>((at_once ? 1 : std::sin(t)) * strain);
+  };
+  Setup<Dim> setup = driven<Dim>(material, {}, 0.35, 4);
+  setup.dirichlet.clear();
+  setup.initial_displacement.clear();
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  for (int k = 1; k <= 4; ++k) {
+    const StepReport report = advance(simulation).report;
+    EXPECT_LE(stress_in(simulation).norm(), 1e-7 * material.lame_mu()) << name_of(material) << ", step " << k;
+    EXPECT_NEAR(report.viscous_dissipation, 0, 1e-10 * material.lame_mu()) << name_of(material) << ", step " << k;
+  }
+}
+
+TEST(Viscous, FreeGrowthHasNoStressAndNoPast) {
+  for (const bool at_once : {true, false}) {
+    for (const Material& material : viscous_laws<2>()) expect_free_growth<2>(material, at_once);
+    for (const Material& material : viscous_laws<3>()) expect_free_growth<3>(material, at_once);
+  }
 }
 
 /// All that a step of strain stores in the terms is dissipated in the end.

@@ -40,26 +40,41 @@ Mat<3> shape_change(ShapeMeasure measure, const Mat<3>& G) {
   return strain.A + change * (strain.A + Mat<3>::Identity());
 }
 
-/// The instantaneous law's part of shape at a point: S = 2 dW/dM, W and M.
+/// The instantaneous law's part of shape at a point: S = 2 dW/dM, W and M, of what is strain beyond the eigenstrain, by the
+/// volume that is free of stress.
 struct ShapeResponse {
   Voigt S, M;
-  double density;
+  double density, volume;
 
   ShapeResponse(const Material& material, const Vec<3>& X, const Mat<3>& G) {
     const ShapeMeasure measure = shape_measure(material);
-    const ElasticModuli moduli = shape_part(elastic_moduli<3>(material, X));
-    const DisplacementGradient<3> at{G};
-    density = elastic_density<3>(at, moduli);
+    const ElasticModuli grown = elastic_moduli<3>(material, X), moduli = without_growth(shape_part(grown));
+    const DisplacementGradient<3> at{elastic_gradient(G, grown.growth)};
     const Mat<3> P = elastic_stress<3>(at, moduli);
-    M = voigt(shape_change(measure, G));
+    volume = volume_ratio(grown.growth);
+    density = grown.growth.is_subtracted ? P.cwiseProduct(at.G).sum() / 2 : elastic_density<3>(at, moduli);
+    M = voigt(shape_change(measure, at.G));
     if (measure == ShapeMeasure::small) {
       S = voigt(P);
     } else {
-      const double factor = measure == ShapeMeasure::whole ? 1 : std::exp(2.0 / 3 * Strain<3>(G).log_J);
+      const double factor = measure == ShapeMeasure::whole ? 1 : std::exp(2.0 / 3 * Strain<3>(at.G).log_J);
       S = voigt(factor * at.F().inverse() * P);
     }
   }
 };
+
+/// The stress by F of a stress by F_e, and the derivative of that.
+Mat<3> grown(const Mat<3>& P, const Growth& growth) {
+  return growth && !growth.is_subtracted ? Mat<3>(growth.volume * P * growth.inverse) : P;
+}
+Mat<9> grown(const Mat<9>& hessian, const Growth& growth) {
+  if (!growth || growth.is_subtracted) return hessian;
+  Mat<9> change = Mat<9>::Zero();  // of F_e by F
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) change(i + 3 * j, i + 3 * k) = growth.inverse(j, k);
+  return growth.volume * change * hessian * change;
+}
 
 }  // namespace
 
@@ -205,9 +220,9 @@ typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cel
       now[row + Field::kProduct] = product(Q, law.M) / 2;
       row += Field::kOfTerm;
     }
-    cell.dissipation += weight * dissipation;
-    cell.stored_excess += weight * excess;
-    volume += weight;
+    cell.dissipation += weight * law.volume * dissipation;
+    cell.stored_excess += weight * law.volume * excess;
+    volume += weight * law.volume;
     shear = elastic_moduli<3>(material, X).lame.mu;
   });
   cell.records = at_vertices<Dim>(cell.records, q);
@@ -256,12 +271,20 @@ std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>& mesh, const st
     at_rest.push_back(Field::Records::Zero(terms == 0 ? 0 : Field::kOfLaw + Field::kOfTerm * terms, Dim + 1));
   }
   const double dt = has_relaxed ? std::numeric_limits<double>::infinity() : 0;
-  return ViscousStep<Dim>(std::make_shared<Field>(mesh, t, std::move(at_rest)), materials, dt).end(mesh, x, t).state;
+  const auto state = ViscousStep<Dim>(std::make_shared<Field>(mesh, t, at_rest), materials, dt).end(mesh, x, t).state;
+  std::vector<typename Field::Records> records = std::dynamic_pointer_cast<const Field>(state)->by_cell();
+  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
+    bool is_at_rest = true;
+    for_each_node(mesh, mesh.cell(c),
+                  [&](int node) { is_at_rest = is_at_rest && x.segment<Dim>(Dim * node) == mesh.rest(node); });
+    if (is_at_rest) records[static_cast<std::size_t>(c)] = at_rest[static_cast<std::size_t>(c)];
+  }
+  return std::make_shared<Field>(mesh, t, std::move(records));
 }
 
 template <int Dim>
 ViscousPast<Dim>::ViscousPast(const CellSet<Dim>& cells, std::shared_ptr<const ViscousStep<Dim>> step)
-    : step_(std::move(step)), by_element_(cells.elements.size()) {
+    : cells_(&cells), step_(std::move(step)), by_element_(cells.elements.size()) {
   parallel_blocks(by_element_.size(), kElements, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e)
       if (acts_on(cells.elements[e]))
@@ -274,13 +297,27 @@ ViscousPast<Dim>::ViscousPast(const CellSet<Dim>& cells, std::shared_ptr<const V
 template <int Dim>
 typename ViscousPast<Dim>::Point ViscousPast<Dim>::at(std::size_t e, const typename CellSet<Dim>::Element& element,
                                                       const QuadraturePoint<Dim>& point) const {
-  return {step_->measure(element.body), tensor(by_element_[e] * weights_of(point.weights))};
+  const Material& material = step_->material(element.body);
+  Growth growth;
+  if (material.eigenstrain)
+    growth = growth_at<3>(material, point_in_space<Dim>(rest_position<Dim>(*cells_, element, point.weights)));
+  return {shape_measure(material), tensor(by_element_[e] * weights_of(point.weights)), growth};
+}
+
+template <int Dim>
+Mat<3> ViscousPast<Dim>::Point::stress(const Mat<3>& G) const {
+  return grown(past_stress(measure, elastic_gradient(G, growth), H), growth);
+}
+
+template <int Dim>
+Mat<9> ViscousPast<Dim>::Point::hessian(const Mat<3>& G) const {
+  return grown(past_hessian(measure, elastic_gradient(G, growth) + Mat<3>::Identity(), H), growth);
 }
 
 template <int Dim>
 std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Records& records,
                                         const std::array<double, Dim + 1>& weights, const Material& material,
-                                        const Mat<3>& F) {
+                                        const Vec<3>& X, const Mat<3>& F) {
   using Field = ViscousField<Dim>;
   if (records.rows() == 0) return {Mat<3>::Zero(), 0};
   const VectorX here = records * weights_of(weights);
@@ -291,17 +328,20 @@ std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Record
     Q += here.segment<6>(row);
     density += here[row + Field::kDensity] - material.prony[i].g * here[Field::kDensity];
   }
-  const Mat<3> P = past_stress(shape_measure(material), Mat<3>(F - Mat<3>::Identity()), tensor(-Q));
-  return {P * F.transpose() / F.determinant(), density};
+  const Growth growth = material.eigenstrain ? growth_at<3>(material, X) : Growth{};
+  const Mat<3> G = elastic_gradient(Mat<3>(F - Mat<3>::Identity()), growth);
+  const Mat<3> P = grown(past_stress(shape_measure(material), G, tensor(-Q)), growth);
+  return {P * F.transpose() / F.determinant(), volume_ratio(growth) * density};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                  \
-  template class ViscousStep<Dim>;                                                                            \
-  template class ViscousPast<Dim>;                                                                            \
-  template std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&, \
-                                                            ConstVectorView, double, bool);                   \
-  template std::pair<Mat<3>, double> past_of_state<Dim>(                                                      \
-      const ViscousField<Dim>::Records&, const std::array<double, Dim + 1>&, const Material&, const Mat<3>&);
+#define ITR_INSTANTIATE(Dim)                                                                                                \
+  template class ViscousStep<Dim>;                                                                                          \
+  template class ViscousPast<Dim>;                                                                                          \
+  template std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&,               \
+                                                            ConstVectorView, double, bool);                                 \
+  template std::pair<Mat<3>, double> past_of_state<Dim>(const ViscousField<Dim>::Records&,                                  \
+                                                        const std::array<double, Dim + 1>&, const Material&, const Vec<3>&, \
+                                                        const Mat<3>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

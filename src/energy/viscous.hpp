@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "energy/cell_field.hpp"
+#include "energy/elastic/growth.hpp"
 #include "energy/elastic/laws.hpp"
 #include "energy/past_energy.hpp"
 
 namespace itr {
 
-/// M(F): J^(-2/3) C - 1 of laws with an isochoric part, C - 1 of other laws, 2 e of small strains.
+/// M(F), of the elastic part of F: J^(-2/3) C - 1 of laws with an isochoric part, C - 1 of other laws, 2 e of small strains.
 enum class ShapeMeasure { isochoric, whole, small };
 ShapeMeasure shape_measure(const Material& material);
 
@@ -33,7 +34,8 @@ class ViscousField final : public CellField<Dim> {
   static constexpr int kOfLaw = 8, kOfTerm = 8, kDensity = 6, kProduct = 7;
 };
 
-/// The state of bodies that come to positions x at once, or have long been there; null where none is viscoelastic.
+/// The state of bodies that come to positions x at once, or have long been there; null where none is viscoelastic. Cells
+/// that are where they are at rest have no stress: an eigenstrain there acts from the first step on.
 template <int Dim>
 std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
                                                  ConstVectorView x, double t, bool has_relaxed = false);
@@ -55,12 +57,13 @@ class ViscousStep {
   using Records = typename ViscousField<Dim>::Records;
   using Stress = Eigen::Matrix<double, 6, Dim + 1>;  ///< 00, 11, 22, 01, 02, 12 at the vertices of a cell [Pa]
 
-  /// `materials` are those of the setup, `dt` may be 0 or infinite [s].
+  /// `materials` are those of the setup at the end of the step, `dt` may be 0 or infinite [s].
   ViscousStep(std::shared_ptr<const ViscousField<Dim>> start, const std::map<int, Material>& materials, double dt);
 
   /// Share of the instantaneous moduli of shape that act on changes over the step.
   double factor(int body) const;
-  ShapeMeasure measure(int body) const { return shape_measure(materials_.at(body)); }
+  ShapeMeasure measure(int body) const { return shape_measure(material(body)); }
+  const Material& material(int body) const { return materials_.at(body); }
   bool acts_on(int body) const { return materials_.contains(body); }
   /// H in an element.
   Stress past(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const;
@@ -87,15 +90,19 @@ class ViscousPast {
   struct Point {
     ShapeMeasure measure;
     Mat<3> H;
+    Growth growth;
 
-    double density(const Mat<3>& G) const { return past_density(measure, G, H); }
-    Mat<3> stress(const Mat<3>& G) const { return past_stress(measure, G, H); }
-    Mat<9> hessian(const Mat<3>& G) const { return past_hessian(measure, G + Mat<3>::Identity(), H); }
+    double density(const Mat<3>& G) const {
+      return volume_ratio(growth) * past_density(measure, elastic_gradient(G, growth), H);
+    }
+    Mat<3> stress(const Mat<3>& G) const;
+    Mat<9> hessian(const Mat<3>& G) const;
   };
   bool acts_on(const typename CellSet<Dim>::Element& element) const { return step_->acts_on(element.body); }
   Point at(std::size_t e, const typename CellSet<Dim>::Element& element, const QuadraturePoint<Dim>& point) const;
 
  private:
+  const CellSet<Dim>* cells_;
   std::shared_ptr<const ViscousStep<Dim>> step_;
   std::vector<typename ViscousStep<Dim>::Stress> by_element_;  ///< 0 in elastic ones
 };
@@ -103,11 +110,11 @@ class ViscousPast {
 template <int Dim>
 using ViscousEnergy = PastEnergy<Dim, ViscousPast<Dim>>;
 
-/// Cauchy stress in space [Pa] and energy density that the past of a body adds to those of its instantaneous law, at a point
-/// with barycentric coordinates `weights` of a cell with these records.
+/// Cauchy stress in space [Pa] and energy density that the past of a body adds to those of its instantaneous law, at the
+/// rest position X, a point with barycentric coordinates `weights` of a cell with these records.
 template <int Dim>
 std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Records& records,
                                         const std::array<double, Dim + 1>& weights, const Material& material,
-                                        const Mat<3>& F);
+                                        const Vec<3>& X, const Mat<3>& F);
 
 }  // namespace itr

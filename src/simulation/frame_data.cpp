@@ -138,7 +138,8 @@ struct FrameCells {
     if (softening && material.mullins)
       return softening_of_state<Dim>(softening->by_cell()[cell], point.weights, material, point.X, in_space(point).first);
     if (!viscous || material.prony.empty()) return {Mat<3>::Zero(), 0};
-    return past_of_state<Dim>(viscous->by_cell()[cell], point.weights, material, in_space(point).first);
+    const auto [F, X] = in_space(point);
+    return past_of_state<Dim>(viscous->by_cell()[cell], point.weights, material, X, F);
   }
   /// Mean energy density of the patches in an element.
   double density(const typename CellSet<Dim>::Element& element, std::span<const CellPoint<Dim>> points) const {

@@ -225,7 +225,8 @@ State<Dim> initial_state(const Setup<Dim>& setup) {
   open_faces(setup, state.chords, state.history.x[0], state.mesh);
   state.history.v = {sampled(setup.initial_velocity)};
   if (setup.time.integrator == Integrator::newmark) state.history.a = {sampled(setup.initial_acceleration)};
-  state.history.viscous = begin_viscous<Dim>(state.mesh, setup.materials, state.history.x[0], state.t, setup.time.is_static);
+  state.history.viscous =
+      begin_viscous<Dim>(state.mesh, materials_at(setup, state.t), state.history.x[0], state.t, setup.time.is_static);
   state.history.softening = begin_softening<Dim>(state.mesh, setup.materials, state.history.x[0], state.t);
   refuse_deformed(setup, state);
   return state;

@@ -151,7 +151,7 @@ std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup
   const auto start = std::dynamic_pointer_cast<const ViscousField<Dim>>(history.viscous);
   if (!start) return nullptr;
   const double dt = setup.time.is_static ? std::numeric_limits<double>::infinity() : t - start->time();
-  return std::make_shared<ViscousStep<Dim>>(start, setup.materials, dt);
+  return std::make_shared<ViscousStep<Dim>>(start, materials_at(setup, t), dt);
 }
 
 template <int Dim>

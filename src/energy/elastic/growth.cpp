@@ -104,6 +104,8 @@ Growth growth_at(const Material& material, const Vec<3>& X) {
   return growth;
 }
 
+Mat<3> elastic_gradient(const Mat<3>& G, const Growth& growth) { return growth ? elastic_part<3, 3>(G, growth).G : G; }
+
 ElasticModuli without_growth(const ElasticModuli& moduli) {
   ElasticModuli law = moduli;
   law.growth = {};
