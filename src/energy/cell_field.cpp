@@ -80,7 +80,7 @@ typename CellField<Dim>::Records CellField<Dim>::on(const CellSet<Dim>& cells, c
   return records;
 }
 
-/// Of each point one weight is larger than the others, so that their matrix has an inverse.
+/// Inverts the matrix of the points' weights: of each point one weight is larger than the others.
 template <int Dim>
 typename CellField<Dim>::Records at_vertices(const typename CellField<Dim>::Records& at_points, int points) {
   if (points == 1) return at_points.col(0).replicate(1, Dim + 1);

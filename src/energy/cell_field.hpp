@@ -50,7 +50,7 @@ class CellField : public CellHistory {
 template <int Dim>
 typename CellField<Dim>::Records at_vertices(const typename CellField<Dim>::Records& at_points, int points);
 
-/// What a step leaves: the state, and energies [J].
+/// State and energies [J] at the end of a step.
 struct HistoryEnd {
   std::shared_ptr<const CellHistory> state;
   double dissipation = 0;

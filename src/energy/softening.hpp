@@ -18,7 +18,7 @@ namespace itr {
 struct SofteningResponse {
   double value = 0, first = 0, second = 0;
 };
-/// What softening adds to W: the integral of (1 - eta) from W to `largest`; 0 from there on.
+/// Integral of (1 - eta) from W to `largest`, which softening adds to W; 0 from there on.
 SofteningResponse softening(const MullinsSoftening& mullins, double W, double largest);
 /// The energy density that has been lost where the largest W was `largest` >= 0, and its derivative.
 struct LostDensity {

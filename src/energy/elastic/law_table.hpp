@@ -91,7 +91,7 @@ bool is_nearly_incompressible(const Material& material, int dim);
 /// Why a material of bodies in `dim` dimensions (3 where they are turned) cannot be viscoelastic; empty: it can.
 std::string why_not_viscous(const Material& material, int dim);
 
-/// The same of Mullins' softening, which takes a part that is isochoric.
+/// Why it cannot soften after Mullins, for which it needs an isochoric part; empty: it can.
 std::string why_not_softening(const Material& material, int dim);
 
 /// A material of the sum in a space of `dim` dimensions, whose moduli at rest must be > 0; E and nu are made of these.
