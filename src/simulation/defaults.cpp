@@ -107,7 +107,9 @@ double usual_modulus(const Setup<Dim>& setup) {
     const double energy = mass * speed * speed + (load + mass * gravity) * box.diagonal().norm();
     pressure = std::max(pressure, energy / (area * size));
   }
-  return std::max(stiffest_modulus(setup), pressure / kStrain);
+  const double usual = std::max(stiffest_modulus(setup), pressure / kStrain);
+  constexpr double kAny = 1;  ///< [Pa]: nothing presses, and what parts the bodies presses as little as it has to
+  return usual > 0 || bodies.empty() ? usual : kAny;
 }
 
 template <int Dim>

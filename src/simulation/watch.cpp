@@ -28,15 +28,21 @@ constexpr double kGapFraction = 0.03;      ///< of the way that bodies are compr
 constexpr double kNoStrain = 1e-6;         ///< below it the energy of bodies is taken for none
 constexpr double kResidualFraction = 0.1;  ///< of the split tolerance, from which a residual hides what splits gain
 
-/// Energy of the bodies by the square of a strain that is everywhere, sum(E V) [J].
+/// Energy of the bodies by the square of a strain that is everywhere, sum(E V) [J]: of those that deform, if any do.
 template <int Dim>
 double stiffness(const Setup<Dim>& setup) {
-  double sum = 0;
-  for (const CellId c : setup.mesh.live_cells())
-    if (!rigid_body_of(setup.materials.at(setup.mesh.body(c))))
-      sum += setup.materials.at(setup.mesh.body(c)).youngs_modulus * setup.mesh.volume(c) *
-             turn_at(setup.mesh, setup.mesh.barycenter(c));
-  return sum;
+  double deformable = 0, rigid = 0;
+  for (const CellId c : setup.mesh.live_cells()) {
+    const Material& material = setup.materials.at(setup.mesh.body(c));
+    (rigid_body_of(material) ? rigid : deformable) +=
+        material.youngs_modulus * setup.mesh.volume(c) * turn_at(setup.mesh, setup.mesh.barycenter(c));
+  }
+  return deformable > 0 ? deformable : rigid;
+}
+
+template <int Dim>
+bool are_all_rigid(const Setup<Dim>& setup) {
+  return std::ranges::all_of(setup.materials, [](const auto& entry) { return rigid_body_of(entry.second) != nullptr; });
 }
 
 }  // namespace
@@ -109,7 +115,8 @@ void Watch<Dim>::find_wide_gaps(const Setup<Dim>& setup, const State<Dim>& state
                                 const Logger& logger) {
   constexpr double kSmallWeight = 0.1, kLeastRest = 0.1;
   if (!setup.contact.enabled || setup.time.has_inertia() || !setup.neumann.empty() || !setup.pressure.empty() ||
-      !setup.cavities.empty() || !setup.nodal_loads.empty() || !setup.terms.empty() || setup.follower.forces)
+      !setup.cavities.empty() || !setup.nodal_loads.empty() || !setup.terms.empty() || setup.follower.forces ||
+      are_all_rigid(setup))
     return;
   if (report.energy.elastic > most_elastic_) {
     most_elastic_ = report.energy.elastic;
