@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Values with units of their own, {"value": 20, "unit": "kPa"}: they become numbers in the units of the scene before anybody
-// reads them.
+// Values with units of their own, {"value": 20, "unit": "kPa"} or "20 kPa": they become numbers in the units of the scene
+// before anybody reads them.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -106,7 +107,24 @@ bool is_quantity(const Json& json) {
          json["unit"].is_string() && (json["value"].is_number() || json["value"].is_string());
 }
 
+/// "20 kPa" as the object that it stands for; nothing of other texts.
+std::optional<Json> read_quantity(const std::string& text) {
+  double number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, number);
+  const std::string_view left(rest, static_cast<std::size_t>(end - rest));
+  const std::size_t start = left.find_first_not_of(' ');
+  if (error != std::errc() || start == std::string_view::npos || left[start] == '1' || !parse_unit(left.substr(start)))
+    return std::nullopt;
+  return Json{{"value", number}, {"unit", std::string(left.substr(start))}};
+}
+
 void convert(Json& json, const std::string& pointer, const Document& document) {
+  if (json.is_string()) {
+    const Entry* entry = key_table().find_place(pointer);
+    if (!entry || entry->key->unit.empty()) return;
+    if (const auto quantity = read_quantity(json.get<std::string>())) json = *quantity;
+  }
   if (json.is_array())
     for (std::size_t i = 0; i < json.size(); ++i) convert(json[i], pointer + "/" + std::to_string(i), document);
   if (!json.is_object()) return;
