@@ -211,7 +211,8 @@ void expect_growth_to_be_as_motion(Material material) {
   material.eigenstrain = [is_small](const Vec<3>&, double t) {
     Mat<3> F = Mat<3>::Identity();
     F.topLeftCorner<Dim, Dim>() = stretched<Dim>(t);
-    return is_small ? Mat<3>(Mat<3>::Identity() - F) : Mat<3>(F.inverse() - Mat<3>::Identity());
+    const Mat<3> strain = is_small ? Mat<3>(Mat<3>::Identity() - F) : Mat<3>(F.inverse() - Mat<3>::Identity());
+    return Mat<3>((strain + strain.transpose()) / 2);
   };
   Simulation<Dim> held(driven<Dim>(
                            material, [](double) { return Mat<Dim>(Mat<Dim>::Identity()); }, 0.35, 5),

@@ -217,7 +217,6 @@ bool may_average_volume(const Material& material, int dim) {
 }
 
 std::string why_not_viscous(const Material& material, int dim) {
-  if (material.eigenstrain) return "a material that has an eigenstrain";
   if (material.law == MaterialLaw::mooney_rivlin && dim == 2)
     return "MooneyRivlin in 2D, which has invariants of the plane; IsochoricMooneyRivlin has those of space";
   if (material.law != MaterialLaw::own)
