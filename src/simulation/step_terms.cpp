@@ -54,8 +54,10 @@ Loads<Dim> loads_at(const StepSetup<Dim>& setup, double t) {
     CavityLoad load{cavity.surfaces, 0, cavity.external_pressure, cavity.exponent, cavity.bulk_modulus};
     load.pressure = finite<Dim, double>(cavity.pressure ? cavity.pressure(t) : 0, place.c_str(), Vec<Dim>::Zero(), t);
     if (cavity.bulk_modulus == 0 && load.pressure + load.external_pressure < 0)
-      throw InputError({"", place, fmt::format("{:g} Pa at t = {:g} s, below a vacuum", load.pressure, t),
-                        fmt::format("at least minus the external pressure, {:g} Pa", load.external_pressure)});
+      throw InputError(
+          {"", place,
+           fmt::format("{} at t = {}, below a vacuum", setup.units.text(load.pressure, "Pa"), setup.units.text(t, "s")),
+           "at least minus the external pressure, " + setup.units.text(load.external_pressure, "Pa")});
     loads.cavities.push_back(std::move(load));
   }
   return loads;
