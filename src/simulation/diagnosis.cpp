@@ -10,6 +10,8 @@
 #include <string_view>
 
 #include "fem/quadrature.hpp"
+#include "geometry/rotation.hpp"
+#include "simulation/held_turn.hpp"
 #include "simulation/named.hpp"
 
 namespace itr {
@@ -48,6 +50,31 @@ PairKind kind_of_pair(const StepLimit& limit) {
   if (limit.vertices.size() == 3) return PairKind::edge_vertex;
   if (limit.vertices.size() == 2) return PairKind::vertex_vertex;
   return limit.kind == "edge-edge pair" ? PairKind::edge_edge : PairKind::face_vertex;
+}
+
+/// The least det F of an element at x.
+template <int Dim>
+double volume_ratio(const typename CellSet<Dim>::Element& element, const VectorX& x) {
+  if (!element.curved) return deformation_gradient<Dim>(element, x).determinant();
+  double least = std::numeric_limits<double>::infinity();
+  const auto nodes = at_nodes<Dim>(element.nodes(), x);
+  for (const auto& point : closed_quadrature<Dim>(1))
+    least = std::min(least, Mat<Dim>(nodes * shape_gradients<Dim>(element, point.weights).transpose()).determinant());
+  return least;
+}
+
+/// The name of a law whose forces stay finite where a cell becomes flat; null: they do not, or may not.
+const char* law_that_gives_way(const Material& material) {
+  switch (material.law) {
+    case MaterialLaw::linear:
+      return "linear elasticity";
+    case MaterialLaw::saint_venant_kirchhoff:
+      return "SaintVenant";
+    case MaterialLaw::fixed_corotated:
+      return "FixedCorotational";
+    default:
+      return nullptr;
+  }
 }
 
 template <int Dim>
@@ -94,22 +121,13 @@ class Diagnosis {
     double least = std::numeric_limits<double>::infinity();
     std::span<const int> worst;
     for (const auto& element : scope_.cells.elements) {
-      const auto look = [&](const Mat<Dim>& F) {
-        if (const double ratio = F.determinant(); ratio < least) {
-          least = ratio;
-          worst = element.vertices;
-        }
-      };
       bool has_it = false;
       for_each_node(element, [&](int node) { has_it = has_it || node == vertex; });
       if (!has_it) continue;
-      if (!element.curved) {
-        look(deformation_gradient<Dim>(element, x_));
-        continue;
-      }
-      const auto nodes = at_nodes<Dim>(element.nodes(), x_);
-      for (const auto& point : closed_quadrature<Dim>(1))
-        look(nodes * shape_gradients<Dim>(element, point.weights).transpose());
+      const double ratio = volume_ratio<Dim>(element, x_);
+      if (!(ratio < least)) continue;
+      least = ratio;
+      worst = element.vertices;
     }
     if (!worst.empty()) text_ << "; its cell " << named_cell(worst) << " has the volume ratio " << least;
   }
@@ -132,6 +150,26 @@ class Diagnosis {
     if (std::isfinite(least))
       text_ << "; its contact pair " << named_pair(nearest.kind, vertices_of(nearest)) << " has the distance "
             << scope_.units.text(least, "m");
+  }
+  /// Whether something in the bodies gives way that the loads press flat.
+  std::string collapse() const {
+    constexpr double kFlat = 0.01;
+    double least = kFlat;
+    const typename CellSet<Dim>::Element* flattest = nullptr;
+    for (const auto& element : scope_.cells.elements) {
+      if (!law_that_gives_way(scope_.materials.at(element.body))) continue;
+      const double ratio = volume_ratio<Dim>(element, x_);
+      if (!(ratio < least)) continue;
+      least = ratio;
+      flattest = &element;
+    }
+    if (!flattest) return {};
+    return fmt::format(
+        "cells are pressed flat, one near {} {} to {:.1g} of its volume, which {} does not resist by more than finite "
+        "forces: "
+        "the loads exceed what the body can carry; smaller loads, or NeoHookean, which resists",
+        point_text<Dim>(middle_of<Dim>(flattest->vertices, x_), scope_.units, 4), scope_.units.length(), least,
+        law_that_gives_way(scope_.materials.at(flattest->body)));
   }
   void append(const std::string& text) { text_ << text; }
   std::string text() const { return text_.str(); }
@@ -167,6 +205,7 @@ template <int Dim>
 std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary, const EnergySum& sum, const VectorX& x,
                       Workspace& workspace) {
   Diagnosis<Dim> result(scope, x, workspace);
+  const std::string collapse = result.collapse();
   const VectorX& step = summary.failed_step;
   if (step.size() == x.size() && step.allFinite()) result.name_limit_of(step);
   if (result.text().empty() && summary.blocked_step.size() == x.size()) {
@@ -180,7 +219,36 @@ std::string diagnosis(const SolveScope<Dim>& scope, const NewtonSummary& summary
     result.name_worst_cell_at(vertex);
     result.name_nearest_pair_at(vertex);
   }
-  return result.text();
+  return (collapse.empty() ? "" : "; " + collapse) + result.text();
+}
+
+template <int Dim>
+bool is_crushed(const SolveScope<Dim>& scope, const NewtonSummary& summary, const VectorX& x) {
+  constexpr double kNothing = 1e-10;
+  if (!summary.converged()) return false;
+  return std::ranges::any_of(scope.cells.elements, [&](const auto& element) {
+    return law_that_gives_way(scope.materials.at(element.body)) && volume_ratio<Dim>(element, x) < kNothing;
+  });
+}
+
+template <int Dim>
+std::string describe_turn(const SolveScope<Dim>& scope, const Loads<Dim>& loads, const DofMap& dofs, ConstVectorView from,
+                          ConstVectorView to, const VectorX& x) {
+  constexpr double kLarge = 5;  // degrees
+  if (std::string held = describe_large_turn<Dim>(scope.cells, dofs, from, to); !held.empty()) return held;
+  if (loads.pressures.empty() && loads.cavities.empty()) return {};
+  std::map<int, Mat<Dim>> sums;  // of F by body, by volume
+  for (const auto& element : scope.cells.elements)
+    if (scope.materials.at(element.body).law == MaterialLaw::linear)
+      sums.try_emplace(element.body, Mat<Dim>(Mat<Dim>::Zero())).first->second +=
+          element.volume * deformation_gradient<Dim>(element, x);
+  double most = 0;
+  for (const auto& [body, sum] : sums) most = std::max(most, rotation_angle(sum));
+  if (!(most > kLarge)) return {};
+  return fmt::format(
+      "pressure turns a body of linear elasticity by {:.3g} degrees, and rotations stretch it without stress: there is no "
+      "equilibrium near; NeoHookean or SaintVenant do not mind rotations, or hold the body against turning",
+      most);
 }
 
 template <int Dim>
@@ -203,6 +271,12 @@ std::string describe_effort(const SolveScope<Dim>& scope, const NewtonSummary& s
 
 template std::string describe_effort<2>(const SolveScope<2>&, const NewtonSummary&, int, Workspace&);
 template std::string describe_effort<3>(const SolveScope<3>&, const NewtonSummary&, int, Workspace&);
+template bool is_crushed<2>(const SolveScope<2>&, const NewtonSummary&, const VectorX&);
+template bool is_crushed<3>(const SolveScope<3>&, const NewtonSummary&, const VectorX&);
+template std::string describe_turn<2>(const SolveScope<2>&, const Loads<2>&, const DofMap&, ConstVectorView, ConstVectorView,
+                                      const VectorX&);
+template std::string describe_turn<3>(const SolveScope<3>&, const Loads<3>&, const DofMap&, ConstVectorView, ConstVectorView,
+                                      const VectorX&);
 template std::string diagnosis<2>(const SolveScope<2>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
 template std::string diagnosis<3>(const SolveScope<3>&, const NewtonSummary&, const EnergySum&, const VectorX&, Workspace&);
 

@@ -21,7 +21,6 @@
 #include "energy/polyfem/lagged_regularization.hpp"
 #include "fem/hessian_sink.hpp"
 #include "flight_guard.hpp"
-#include "held_turn.hpp"
 #include "itr/core.hpp"
 #include "itr/types.hpp"
 #include "lagging_rounds.hpp"
@@ -383,8 +382,8 @@ class LaggedSolve {
     if (ended_by == EndedBy::caller) return summary;
     if (ended_by == EndedBy::flight) {
       summary.termination = Termination::no_descent;
-      const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target);
-      summary.message = turn.empty() ? guard->describe(setup_.units) : turn;
+      summary.message = describe_turn<Dim>(scope_, terms_.loads, dofs_, base_, held_.target, x);
+      if (summary.message.empty()) summary.message = guard->describe(setup_.units);
       return summary;
     }
     return explained(std::move(summary), sum, x);
@@ -431,12 +430,11 @@ class LaggedSolve {
   }
   /// `summary` with the reason of a failure.
   NewtonSummary explained(NewtonSummary summary, const EnergySum& sum, const VectorX& x) {
+    if (is_crushed<Dim>(scope_, summary, x)) summary.termination = Termination::no_descent;
     if (summary.converged()) return summary;
-    const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-    if (const std::string turn = describe_large_turn<Dim>(cells_, dofs_, base_, held_.target); !turn.empty())
+    if (const std::string turn = describe_turn<Dim>(scope_, terms_.loads, dofs_, base_, held_.target, x); !turn.empty())
       summary.message = turn + "; " + summary.message;
-    summary.message += diagnosis<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
-                                      sum, x, workspace_);
+    summary.message += diagnosis<Dim>(scope_, summary, sum, x, workspace_);
     return summary;
   }
   /// x with held dofs at their targets.
@@ -585,6 +583,8 @@ class LaggedSolve {
   const std::unique_ptr<AdaptiveStiffness<Dim>>& adaptive_ = problem_.adaptive_;
   BarrierStiffness& stiffness_ = problem_.stiffness_;
   Lagged& lagged_ = problem_.lagged_;
+  const SolveScope<Dim> scope_{cells_,         potential_,   surface_,        static_cast<int>(setup_.obstacles.rest.size()),
+                               terms_.scaling, setup_.units, terms_.materials};
   VectorX regularized_about_;
   VectorX norm_weights_;  ///< of NewtonNorm, once needed
 };

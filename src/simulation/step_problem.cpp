@@ -242,8 +242,9 @@ void StepProblem<Dim>::smooth_friction_by(double motion) {
 template <int Dim>
 std::string StepProblem<Dim>::describe_effort(const NewtonSummary& summary) {
   const int num_obstacles = static_cast<int>(setup_.obstacles.rest.size());
-  return itr::describe_effort<Dim>({cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units}, summary,
-                                   rounds_, workspace_);
+  return itr::describe_effort<Dim>(
+      {cells_, potential_, surface_, num_obstacles, terms_.scaling, setup_.units, terms_.materials}, summary, rounds_,
+      workspace_);
 }
 
 /// x minus the positions at the start of the step; of the last solution without the round-off of x.
