@@ -5,6 +5,7 @@
 
 #include "energy/cavity.hpp"
 #include "energy/mapped.hpp"
+#include "energy/polyfem/adhesive_friction.hpp"
 #include "energy/rigid_body.hpp"
 
 namespace itr {
@@ -153,10 +154,15 @@ template <int Dim>
 typename IncrementalPotential<Dim>::Lagged IncrementalPotential<Dim>::lag(ConstVectorView x, Workspace& workspace) const {
   Lagged lagged;
   lag_friction(x, workspace, lagged);
-  if (adhesion_ && is_in(TermKind::adhesive_friction, *terms_))
-    lagged.adhesive_friction = of_cells(
-        std::make_shared<FrictionEnergy<Dim>>(adhesion_->pairs(), on_surface(x), AdhesionEnergy<Dim>::inner(workspace),
-                                              terms_->contact, velocity_of_surface(), adhesion_scaling()));
+  if (adhesion_ && is_in(TermKind::adhesive_friction, *terms_)) {
+    const VelocityRule velocity = velocity_of_surface();
+    FrictionEnergy<Dim> held(adhesion_->pairs(), on_surface(x), AdhesionEnergy<Dim>::inner(workspace), terms_->contact,
+                             velocity, adhesion_scaling());
+    if (terms_->contact.adhesion.is_by_step)
+      lagged.adhesive_friction = of_cells(std::make_shared<AdhesiveFriction<Dim>>(std::move(held), velocity.reference));
+    else
+      lagged.adhesive_friction = of_cells(std::make_shared<FrictionEnergy<Dim>>(std::move(held)));
+  }
   if (is_in(TermKind::pressure, *terms_)) {
     lagged.pressure = std::make_shared<PressureEnergy<Dim>>(cells_, terms_->loads, x, terms_->scaling);
     if (lagged.pressure->empty()) lagged.pressure.reset();

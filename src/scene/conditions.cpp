@@ -10,6 +10,7 @@
 #include <set>
 
 #include "combined_conditions.hpp"
+#include "defaults.hpp"
 #include "eigenstrain.hpp"
 #include "fluids.hpp"
 #include "function.hpp"
@@ -483,7 +484,7 @@ class ConditionReader {
     }
     const Label label = read_condition_label(node["id"]);
     const bool is_zero = label.name.empty() && label.number <= 0;
-    if (ids_of(node["id"]).empty() && label.name.empty() && has_ids_of_files()) {
+    if (ids_of(node["id"]).empty() && label.name.empty() && (has_ids_of_files() || is_side_of_box(label.number))) {
       warnings_.push_back(node["id"].pointer() + ": " + text_of(label) + ", which nothing has: the entry does nothing");
       return taken;
     }
@@ -503,6 +504,19 @@ class ConditionReader {
   bool has_ids_of_files() const {
     const std::vector<Node> geometries = geometry_.items();
     return std::any_of(geometries.begin(), geometries.end(), has_selection_files);
+  }
+
+  /// Whether a `threshold` gives this number to a side of a mesh's box: in PolyFEM's scenes no facet needs to be near it.
+  bool is_side_of_box(int number) const {
+    constexpr int kRest = 7;
+    if (!is_polyfem_set(Node(geometry_.document()))) return false;
+    for (const Node& geometry : geometry_.items())
+      for (const Node& rule : geometry["surface_selection"].items())
+        if (rule.json().is_object() && rule.has("threshold")) {
+          const int side = number - rule["id_offset"].integer(0);
+          if (side > 0 && side <= kRest) return true;
+        }
+    return false;
   }
 
   /// The warning that was given of a selection which would have this id if anything were in it.

@@ -15,6 +15,7 @@
 
 #include "file_parts.hpp"
 #include "mesh/refine.hpp"
+#include "polyfem/cell_order.hpp"
 #include "readers.hpp"
 #include "rigid.hpp"
 #include "selection.hpp"
@@ -300,6 +301,9 @@ void read_body(const Node& geometry, const MeshFile& of_file, const References& 
   put_on_axis<Dim>(geometry, points);
   const Box<Dim> box = bounding_box<Dim>(points);
   check_connected<Dim>(geometry, points, cells);
+  const bool is_ordered = Dim == 3 && has_ideal_cells(Node(geometry.document()));
+  const auto points_before = is_ordered ? points : std::vector<Vec<Dim>>();
+  const auto cells_before = is_ordered ? cells : std::vector<typename Mesh<Dim>::Cell>();
   orient_cells<Dim>(geometry, points, is_mirror, cells, warnings);
   const std::string pointer = geometry["mesh"].pointer();
   if (const auto unused = std::count(renumbered.begin(), renumbered.end(), kNone); unused > 0)
@@ -310,7 +314,11 @@ void read_body(const Node& geometry, const MeshFile& of_file, const References& 
   mesh = refine<Dim>(std::move(mesh), geometry["n_refs"]);
   Keys<Dim> keys(geometry, box, parts, references, sets);
   warn_of_hidden_groups<Dim>(geometry, mesh, parts, keys, references, warnings);
+  const std::size_t first = all.cells.size();
   collect<Dim>(geometry, mesh, box, keys, all, warnings);
+  if constexpr (Dim == 3)
+    if (is_ordered)
+      order_cells(points_before, cells_before, geometry["n_refs"].integer_at_least(0, 0), mesh, all.cells, first);
 }
 
 int dimension_of(const Node& geometry, const MeshFile& file) {

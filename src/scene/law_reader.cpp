@@ -9,6 +9,8 @@
 #include <span>
 #include <utility>
 
+#include "defaults.hpp"
+#include "energy/polyfem/ideal_cell.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -94,8 +96,14 @@ class SumReader {
  private:
   LawSum::Term read_term(const Node& node, const LawRow& row, bool in_sum, const LawSum& sum) {
     LawSum::Term term{&row, read_coefficients(node, row, in_sum, sum.dimension)};
-    if (std::string_view(row.type) == "AMIPS" && !node["use_rest_pose"].boolean(false))
-      node["use_rest_pose"].fail("true: else the energy would depend on the mesh, which remeshing changes");
+    if (std::string_view(row.type) == "AMIPS" && !node["use_rest_pose"].boolean(false)) {
+      const Node pose = node["use_rest_pose"];
+      if (in_sum) pose.fail("true in a sum");
+      if (sum.is_plane_stress) pose.fail("true in plane stress");
+      if (!is_polyfem_set(Node(node.document())))
+        pose.fail("true: else the energy depends on the mesh, which only PolyFEM's set of defaults does");
+      term.row = &ideal_cell_law();
+    }
     if (!row.fibre) return term;
     if (is_activation(node["activation"])) term.share = read_share(node["activation"]);
     if (sum.is_plane_stress) node_["plane_stress"].fail("true, with fibres", "false: fibres are in plane strain only");

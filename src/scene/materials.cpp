@@ -8,6 +8,7 @@
 #include "defaults.hpp"
 #include "eigenstrain.hpp"
 #include "energy/elastic/law_table.hpp"
+#include "energy/polyfem/ideal_cell.hpp"
 #include "function.hpp"
 #include "law_reader.hpp"
 #include "readers.hpp"
@@ -232,6 +233,9 @@ class MaterialReader {
     if (!(shear > 0)) refuse("shear", shear);
     if (!(bulk > 0)) refuse("bulk", bulk);
     material_ = material_of(sum, dimension_);
+    if (is_of_ideal_cell(material_)) ask_for_each_place();
+    if (is_of_ideal_cell(material_) && node_.has("eigenstrain"))
+      node_["eigenstrain"].fail("it in AMIPS without a rest pose", "no such key");
     const auto has_share = [](const LawSum::Term& term) { return static_cast<bool>(term.share); };
     if (std::any_of(sum.terms.begin(), sum.terms.end(), has_share)) {
       material_.own_at = [own = std::static_pointer_cast<const LawSum>(material_.own)](double t) {

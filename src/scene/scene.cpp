@@ -10,6 +10,7 @@
 #include "geometry.hpp"
 #include "mesh/facet_tags.hpp"
 #include "mesh/rest_box.hpp"
+#include "polyfem/geometric_contact.hpp"
 #include "polyfem/python_value.hpp"
 #include "readers.hpp"
 #include "rigid.hpp"
@@ -160,6 +161,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   setup.contact.friction_pairs = read_friction_pairs<Dim>(root, parts, sets, setup.mesh);
+  read_geometric_contact(root, setup);
   return setup;
 }
 
@@ -297,6 +299,7 @@ Setup<Dim> make_setup(Geometry<Dim> geometry, const std::string& options, const 
   read_model<Dim>(root, sets, read_shapes<Dim>(root, sets, sets.facet_tags(setup.mesh)),
                   {std::move(geometry.obstacles), std::move(geometry.id)}, setup, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
+  read_geometric_contact(root, setup);
   return setup;
 }
 

@@ -129,7 +129,7 @@ struct FrameCells {
   /// The law at a point of an element.
   ElasticModuli moduli(const Material& material, const typename CellSet<Dim>::Element& element,
                        const CellPoint<Dim>& point) const {
-    return pressures.in(cell_moduli<Dim>(cells, material, point.X), number(element), point.weights);
+    return pressures.in(cell_moduli<Dim>(cells, element, material, point.X), number(element), point.weights);
   }
   /// Stress in space and energy density that the past adds at a point of an element.
   std::pair<Mat<3>, double> past(const Material& material, const typename CellSet<Dim>::Element& element,
@@ -397,13 +397,13 @@ FrameData<Dim> frame_data(const Setup<Dim>& setup, const State<Dim>& state, cons
     double mean = frame.density(element, points);
     for (const CellPoint<Dim>& point : points) {
       mean += point.fraction * frame.past(material, element, point).second;
-      const ElasticModuli moduli = cell_moduli<Dim>(cells, material, point.X);
+      const ElasticModuli moduli = cell_moduli<Dim>(cells, element, material, point.X);
       mean += point.fraction *
               (point.hoop != 0 ? elastic_density<3>(in_space(point).first, moduli) : elastic_density<Dim>(point.F, moduli));
     }
     if (element.curved && !cells.axisymmetric)
       mean += barrier_density<Dim>(JacobianBarrier<Dim>(element, at_nodes<Dim>(element.nodes(), data.x)),
-                                   cell_moduli<Dim>(cells, material, rest_barycenter<Dim>(cells, element)));
+                                   cell_moduli<Dim>(cells, element, material, rest_barycenter<Dim>(cells, element)));
     data.elastic_density.push_back(mean);
   };
   for_each_cell_in_order<Dim>(cells, data.x, state.quadrature, setup.quadrature_degree, add_density);

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "energy/elastic/law_table.hpp"
+#include "energy/polyfem/ideal_cell.hpp"
 #include "energy/rigid_body.hpp"
 #include "energy/support.hpp"
 #include "itr/core.hpp"
@@ -23,6 +24,11 @@ bool may_curve(const Setup<Dim>& setup) {
 template <int Dim>
 bool has_patches(const Setup<Dim>& setup) {
   return std::ranges::any_of(setup.materials, [](const auto& e) { return e.second.volume == VolumeForm::patches; });
+}
+
+template <int Dim>
+bool has_ideal_cells(const Setup<Dim>& setup) {
+  return std::ranges::any_of(setup.materials, [](const auto& e) { return is_of_ideal_cell(e.second); });
 }
 
 template <int Dim>
@@ -137,6 +143,12 @@ constexpr Check<Dim> kChecks[] = {
                 !may_average_volume(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim);
        });
      }},
+    {{"/materials/*/use_rest_pose", "AMIPS without a rest pose where the mesh changes: its energy depends on the mesh"},
+     [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && has_ideal_cells(setup); }},
+    {{"/materials/*/use_rest_pose", "AMIPS without a rest pose in an axisymmetric scene: its ideal cell is no ring"},
+     [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && has_ideal_cells(setup); }},
+    {{"/output/error_bars", "error bars where AMIPS has no rest pose: its energy depends on the mesh"},
+     [](const Setup<Dim>& setup, bool) { return setup.fields.error_bars && has_ideal_cells(setup); }},
     {{"/axisymmetric", "remeshing of axisymmetric bodies with lumped mass, or by the paper's screening and sizing field"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && setup.mesh.is_axisymmetric() &&

@@ -158,7 +158,7 @@ void ElasticEnergy<Dim>::renew(const std::map<int, Material>& materials, double 
   if (!varies) return;
   by_element_.reserve(cells_.straight().size());
   for (const auto& element : cells_.straight())
-    by_element_.push_back(cell_moduli<Dim>(cells_, materials.at(element.body), rest_barycenter(cells_, element)));
+    by_element_.push_back(cell_moduli<Dim>(cells_, element, materials.at(element.body), rest_barycenter(cells_, element)));
 }
 
 template <int Dim>

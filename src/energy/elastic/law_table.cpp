@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "energy/polyfem/ideal_cell.hpp"
 #include "strain.hpp"
 #include "stretch_response.hpp"
 
@@ -217,6 +218,7 @@ bool may_average_volume(const Material& material, int dim) {
 }
 
 std::string why_not_viscous(const Material& material, int dim) {
+  if (is_of_ideal_cell(material)) return "AMIPS without a rest pose";
   if (material.law == MaterialLaw::mooney_rivlin && dim == 2)
     return "MooneyRivlin in 2D, which has invariants of the plane; IsochoricMooneyRivlin has those of space";
   if (material.law != MaterialLaw::own)

@@ -11,6 +11,7 @@
 
 #include "energy/elastic/laws.hpp"
 #include "energy/energy.hpp"
+#include "energy/polyfem/ideal_cell.hpp"
 #include "fem/cell_set.hpp"
 #include "fem/displacement.hpp"
 #include "fem/quadrature.hpp"
@@ -68,6 +69,15 @@ ElasticModuli cell_moduli(const CellSet<Dim>& cells, const Material& material, c
   }
   const ElasticModuli whole = elastic_moduli<Dim>(material, X);
   return is_parted ? without_volume<Dim>(whole) : whole;
+}
+
+/// The law at a point of one of them.
+template <int Dim>
+ElasticModuli cell_moduli(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, const Material& material,
+                          const Vec<Dim>& X) {
+  ElasticModuli moduli = cell_moduli<Dim>(cells, material, X);
+  if (is_of_ideal_cell(material)) set_ideal_cell<Dim>(element.inverse_edges, moduli);
+  return moduli;
 }
 
 /// Gives `cells` the patches of the bodies whose material asks for some.

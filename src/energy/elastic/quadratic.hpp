@@ -365,9 +365,9 @@ class QuadraticElasticity {
       const Element& element = elements_[e];
       first_varying_.push_back(varying_.size());
       const Material& material = materials_.at(element.body);
-      at_barycenters_.push_back(cell_moduli<Dim>(cells_, material, rest_barycenter<Dim>(cells_, element)));
+      at_barycenters_.push_back(cell_moduli<Dim>(cells_, element, material, rest_barycenter<Dim>(cells_, element)));
       for (const auto& point : rule(e))
-        varying_.push_back(cell_moduli<Dim>(cells_, material, rest_position<Dim>(cells_, element, point.weights)));
+        varying_.push_back(cell_moduli<Dim>(cells_, element, material, rest_position<Dim>(cells_, element, point.weights)));
     }
   }
   /// Whether det F is somewhere in the cell much smaller than at all of its quadrature points.

@@ -34,17 +34,23 @@ StretchSum StretchResponse::powers_of(double alpha, const Vec<3>& strains) const
   return S;
 }
 
-StretchSum StretchResponse::isochoric_powers(double alpha) const {
+/// Of what the sum of the strains adds, powers_of leaves out alpha times that sum.
+StretchSum StretchResponse::powers_by_volume(double alpha, double share) const {
+  const double left = alpha * (1 - share);
   Vec<3> strains = strains_;
-  strains.head(dimension_).array() -= log_J_ / dimension_;
+  strains.head(dimension_).array() -= share * log_J_ / dimension_;
   StretchSum S = powers_of(alpha, strains);
   Mat<3> deviator = Mat<3>::Zero();
-  deviator.topLeftCorner(dimension_, dimension_).setConstant(-1.0 / dimension_);
+  deviator.topLeftCorner(dimension_, dimension_).setConstant(-share / dimension_);
   deviator.diagonal().head(dimension_).array() += 1;
+  S.value += left * log_J_;
   S.first = deviator * S.first;
+  S.first.head(dimension_).array() += left;
   S.second = deviator * S.second * deviator;
   return S;
 }
+
+StretchSum StretchResponse::isochoric_powers(double alpha) const { return powers_by_volume(alpha, 1); }
 
 StretchSum StretchResponse::powers(double alpha) const { return powers_of(alpha, strains_); }
 

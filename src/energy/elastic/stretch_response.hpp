@@ -44,6 +44,8 @@ class StretchResponse {
 
   /// sum_i (t_i^alpha - 1) of isochoric stretches t_i = J^(-1/dimension) s_i.
   StretchSum isochoric_powers(double alpha) const;
+  /// sum_i (t_i^alpha - 1) of t_i = J^(-share/dimension) s_i.
+  StretchSum powers_by_volume(double alpha, double share) const;
   /// sum_i (s_i^alpha - 1) - alpha ln J.
   StretchSum powers(double alpha) const;
 
