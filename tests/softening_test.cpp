@@ -319,6 +319,7 @@ TEST_F(SofteningScene, RefusesWhatDoesNotSoften) {
        {scene::json{{"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}},
         scene::json{{"type", "Hyperfoam"}, {"mus", {10.0}}, {"alphas", {2.0}}, {"nus", {0.3}}},
         scene::json{{"type", "Yeoh"}, {"C", {10.0}}, {"K", 1e3}, {"plane_stress", true}},
+        scene::json{{"type", "Yeoh"}, {"C", {10.0}}, {"K", 1e3}, {"eigenstrain", 0.01}},
         scene::json{{"type", "Yeoh"}, {"C", {10.0}}, {"K", 1e3}, {"prony", {{"g", {0.2}}, {"tau", {1.0}}}}}})
     EXPECT_EQ(failure(with(valid, law)).place, "/materials/0/mullins") << law;
 }

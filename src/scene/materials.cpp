@@ -118,7 +118,8 @@ class MaterialReader {
 
   void read_mullins(const Node& mullins) {
     if (const std::string why = why_not_softening(material_, dimension_); !why.empty())
-      mullins.fail("softening of " + why, "a law and a plane that have an isochoric part in space, without prony");
+      mullins.fail("softening of " + why,
+                   "a law and a plane that have an isochoric part in space, without prony and eigenstrain");
     const auto read = [&](const char* key) {
       const double value = mullins.has(key) ? mullins[key].number(0) : -1;
       if (!(value >= 0)) mullins[key].fail("a number >= 0");

@@ -175,7 +175,7 @@ constexpr Check<Dim> kChecks[] = {
        });
      }},
     {{"/materials/*/mullins",
-      "softening beside prony, in plane stress, or of a law of which no part is known to be isochoric"},
+      "softening beside prony or an eigenstrain, in plane stress, or of a law of which no part is known to be isochoric"},
      [](const Setup<Dim>& setup, bool) {
        return std::ranges::any_of(setup.materials, [&](const auto& e) {
          return e.second.mullins && !why_not_softening(e.second, setup.mesh.is_axisymmetric() ? 3 : Dim).empty();

@@ -238,6 +238,7 @@ std::string why_not_viscous(const Material& material, int dim) {
 
 std::string why_not_softening(const Material& material, int dim) {
   if (!material.prony.empty()) return "a material that is viscoelastic (prony)";
+  if (material.eigenstrain) return "a material that has an eigenstrain";
   if (material.law != MaterialLaw::own && material.law != MaterialLaw::mooney_rivlin)
     return "a law without an isochoric part; IsochoricNeoHookean, Yeoh and Ogden have one";
   return why_not_viscous(material, dim);
