@@ -235,7 +235,7 @@ TEST(Viscous, BodiesThatGrowAreAsBodiesThatMove) {
   for (const Material& material : viscous_laws<3>()) expect_growth_to_be_as_motion<3>(material);
 }
 
-/// What grows freely has no stress and no past, whether it grows at once or by and by.
+/// Expects that a body which grows freely has no stress and no past, whether it grows at once or by and by.
 template <int Dim>
 void expect_free_growth(Material material, bool at_once) {
   material.eigenstrain = [at_once](const Vec<3>&, double t) {

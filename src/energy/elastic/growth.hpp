@@ -12,7 +12,7 @@ template <int Dim>
 Growth growth_at(const Material& material, const Vec<3>& X);
 /// F_e - I where F - I = G in space, of laws that are not of a plane alone.
 Mat<3> elastic_gradient(const Mat<3>& G, const Growth& growth);
-/// Of densities of a body by those of its law.
+/// Volume by that which the law sees: of densities by those of the law.
 inline double volume_ratio(const Growth& growth) { return growth.is_subtracted ? 1 : growth.volume; }
 /// The law that sees F_e.
 ElasticModuli without_growth(const ElasticModuli& moduli);
