@@ -24,13 +24,13 @@ constexpr int kMostIterations = 60;
 constexpr double kEnough = 1e-3, kEnoughInContact = 1e-10;
 /// Relative, for derivatives by d-hat: what it changes and what the response changes of a force nearly cancel.
 constexpr double kDhatChange = 1e-7;
-constexpr double kLeastMotion = 1e-7;  ///< of the bodies' diagonal, for derivatives along a motion
-constexpr double kPartOfGap = 1e-4;    ///< of the smallest, at most
-constexpr double kTried = 0.25;        ///< of the estimated error, where the energy must be what it is expected to be
-constexpr double kOffByMost = 2;       ///< times
-constexpr double kSeen = 1e-9;         ///< of the energy: a fall that round-off leaves some digits of
-constexpr double kUnresolved = 0.5;    ///< of the stored energy
-constexpr double kNothing = 1e-16;     ///< gain by the energy: forces change by its root at most
+constexpr double kLeastMotion = 1e-7;   ///< of the bodies' diagonal, for derivatives along a motion
+constexpr double kPartOfGap = 1e-4;     ///< of the smallest, at most
+constexpr double kTried = 0.25;         ///< of the estimated error, where the energy must be what it is expected to be
+constexpr double kOffByMost = 2;        ///< times
+constexpr double kResolvedFall = 1e-9;  ///< of the energy: a fall that round-off leaves some digits of
+constexpr double kUnresolved = 0.5;     ///< of the stored energy
+constexpr double kNothing = 1e-16;      ///< gain by the energy: forces change by its root at most
 
 /// Barycentric weights over vertices of a mesh; points of one cell have few.
 using Weights = std::map<VertexId, double>;
@@ -466,7 +466,7 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
   if (!try_factors(problem, x, report.no_bar, solve)) return false;
   const double fall = start - fine.sum().value(fine_x + kTried * response.motion, fine.workspace());
   const double expected = kTried * (2 - kTried) * response.gain;
-  if (expected > kSeen * std::abs(start) && !(fall > expected / kOffByMost && fall < expected * kOffByMost)) {
+  if (expected > kResolvedFall * std::abs(start) && !(fall > expected / kOffByMost && fall < expected * kOffByMost)) {
     report.no_bar = "errors are too large for a linear estimate: the mesh does not resolve the solution";
     return false;
   }
