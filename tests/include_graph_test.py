@@ -52,7 +52,8 @@ MOST_PUBLIC = 16
 
 # Plain values that describe a simulation are open to `scene`, and made of these alone.
 EXTRA = {"scene": {"setup.hpp", "simulation/unsupported.hpp", "energy/elastic/law_table.hpp", "energy/rigid_body.hpp",
-                   "energy/support.hpp", "geometry/shape.hpp"}}
+                   "energy/support.hpp", "geometry/shape.hpp", "geometry/fit_shape.hpp", "energy/polyfem/ideal_cell.hpp",
+                   "energy/polyfem/geometric_contact.hpp"}}
 SETUP = {"core.hpp", "energy.hpp", "mesh.hpp", "options.hpp"}
 
 # Third-party header -> the modules that may know it.

@@ -34,7 +34,7 @@ StretchSum StretchResponse::powers_of(double alpha, const Vec<3>& strains) const
   return S;
 }
 
-/// Of what the sum of the strains adds, powers_of leaves out alpha times that sum.
+/// Adds alpha times the sum of the strains, which powers_of leaves out.
 StretchSum StretchResponse::powers_by_volume(double alpha, double share) const {
   const double left = alpha * (1 - share);
   Vec<3> strains = strains_;

@@ -5,9 +5,9 @@
 
 namespace itr {
 
-/// What adhesion holds against sliding in PolyFEM's way, which leaves its Hessian out where nothing has moved. So the first
-/// step from rest takes a body past the slip that would be held: of two solutions, one that sticks and one that slides,
-/// PolyFEM finds the second.
+/// Adhesion against sliding in PolyFEM's way, which leaves its Hessian out where nothing has moved. So the first step from
+/// rest takes a body past the slip that would be held: of two solutions, one that sticks and one that slides, PolyFEM finds
+/// the second.
 template <int Dim>
 class AdhesiveFriction final : public Energy {
  public:

@@ -72,8 +72,8 @@ T fade(const T& at) {
   return chain(at, {x * (2 - x), 2 * (1 - x), -2});
 }
 
-/// Of a vertex, seen from a point outside, `inward` from there: half the length of its edges where it is nearer than the
-/// points beside it on both, and where `inward` goes into the body.
+/// The factor of a vertex, seen from a point outside, `inward` from there: half the length of its edges where it is nearer
+/// than the points beside it on both, and where `inward` goes into the body.
 template <typename T>
 T vertex_factor(const Point<T>& v, const Point<T>& next, const Point<T>& last, const Point<T>& inward,
                 const GeometricContactOptions& options) {

@@ -11,7 +11,7 @@ namespace itr::scene {
 
 namespace {
 
-/// What it does not go with.
+/// Refuses keys that it does not go with.
 template <int Dim>
 void refuse_others(const Node& root, const Setup<Dim>& setup) {
   const Node asked = root["contact"]["use_gcp_formulation"];
