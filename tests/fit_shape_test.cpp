@@ -130,6 +130,13 @@ TEST(FitShape, CoarseCylindersAreNoSpheres) {
   EXPECT_NEAR(fit->shape.radius, 1, 1e-9);
 }
 
+TEST(FitShape, FewCornersTellNoCylinder) {
+  const Vec<3> a(0, 0, 0), b(1, 0, 0), up(0, 0, 1);
+  const std::vector<SurfaceTriangle> triangles{{a, b, b + up}, {a, b + up, a + up}};
+  EXPECT_FALSE(fit_shape(Shape::Kind::cylinder, triangles));
+  EXPECT_TRUE(fit_shape(Shape::Kind::plane, triangles));
+}
+
 TEST(FitShape, CornersOfABoxLieOnNoCylinder) {
   std::vector<SurfaceTriangle> triangles;
   const Vec<3> a(0, 0, 0), b(1, 0, 0), c(1, 2, 0), d(0.5, 1, 0), up(0, 0, 1);

@@ -266,7 +266,21 @@ double farthest_from(const Shape& shape, std::span<const SurfaceTriangle> triang
   return most;
 }
 
-/// The nearest shape, in the samples' box.
+/// Whether the points tell all numbers of a shape: no change of these leaves all distances alone.
+bool is_told_by(const Shape& shape, const Samples& samples) {
+  constexpr double kRoundOff = 1e-16;          // of squares of derivatives
+  constexpr int kNumbers[] = {3, 4, 5, 6, 7};  // by kind: those that make another surface
+  Eigen::Matrix<double, 9, 9> matrix = Eigen::Matrix<double, 9, 9>::Zero();
+  for (const Vec<3>& point : samples.points) {
+    const Change row = slope(shape, point, offset_from(shape, point).normal);
+    matrix += row * row.transpose();
+  }
+  const Eigen::Matrix<double, 9, 1> squares =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>>(matrix).eigenvalues();
+  return squares[9 - kNumbers[static_cast<int>(shape.kind)]] > kRoundOff * squares[8];
+}
+
+/// The nearest shape, in the samples' box; nothing if there are many.
 std::optional<Shape> fit_samples(Shape::Kind kind, const Samples& samples) {
   std::optional<Shape> best;
   double least = std::numeric_limits<double>::infinity();
@@ -278,7 +292,7 @@ std::optional<Shape> fit_samples(Shape::Kind kind, const Samples& samples) {
     best = shape;
     least = left;
   }
-  return best;
+  return best && is_told_by(*best, samples) ? best : std::nullopt;
 }
 
 /// Mean of the squared sines of the angles between a shape and the triangles.

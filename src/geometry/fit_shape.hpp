@@ -19,7 +19,8 @@ struct ShapeFit {
 
 /// The shape of this kind that is nearest to the corners, in the mean of squares: Levenberg and Marquardt's method on the
 /// distances, begun from the normals of the triangles (Pottmann and Randrup 1998, "Rotational and helical surface
-/// approximation": the normals of a surface of revolution meet its axis). Nothing if no start leads to a shape.
+/// approximation": the normals of a surface of revolution meet its axis). Nothing if no start leads
+/// to a shape, or the corners are too few to tell one.
 std::optional<ShapeFit> fit_shape(Shape::Kind kind, std::span<const SurfaceTriangle> triangles);
 
 /// The kind of shape that the corners lie on up to `tolerance` of their box's diagonal. Corners alone may not tell it (two

@@ -147,7 +147,7 @@ Shape shape_through(const ShapeEntry& entry, std::span<const SurfaceTriangle> tr
   const std::optional<ShapeFit> fit = asked.kind == fitted
                                           ? recognize_shape(triangles, tolerance)
                                           : fit_shape(Dim == 2 && asked.kind == sphere ? cylinder : asked.kind, triangles);
-  const std::string found = abbreviate(entry.node["surface"].json()) + ", whose vertices lie on no ";
+  const std::string found = abbreviate(entry.node["surface"].json()) + ", whose vertices tell no ";
   const std::string expected = "a surface of one geometry, or the numbers of the type beside it";
   if (asked.kind == fitted && !fit) entry.node["surface"].fail(found + "plane, sphere, cylinder, cone or torus", expected);
   if (!fit || fit->farthest > tolerance)

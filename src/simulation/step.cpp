@@ -145,8 +145,7 @@ class StepSolver {
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
-    if (next_.history.viscous) end_viscous(start);
-    if (next_.history.softening) end_softening(start);
+    end_pasts(start);
     if (setup_.contact.enabled) tell_of_closed_faces();
     if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
@@ -356,25 +355,22 @@ class StepSolver {
     }
   }
 
-  /// Lets viscoelastic bodies relax over the step; `start`, unless null, gets the state before it on its mesh.
-  void end_viscous(State<Dim>* start) {
-    if (start && !renumbering_.empty())
-      start->history.viscous =
-          viscous_step(setup_, next_.history, before_.t)->end(next_.mesh, next_.history.x[0], before_.t).state;
-    auto end = viscous_step(setup_, next_.history, next_.t)->end(next_.mesh, x_, next_.t);
-    next_.history.viscous = std::move(end.state);
-    report_.viscous_dissipation = end.dissipation;
-    report_.history_loss += end.loss;
+  /// Lets viscoelastic bodies relax over the step, and its largest densities soften others; `start`, unless null, gets the
+  /// states before it on its mesh.
+  void end_pasts(State<Dim>* start) {
+    const auto viscous_at = [&](double t) { return viscous_step(setup_, next_.history, t); };
+    const auto softening_at = [&](double) { return softening_step(setup_, next_.history); };
+    if (next_.history.viscous) end_past(&History::viscous, viscous_at, report_.viscous_dissipation, start);
+    if (next_.history.softening) end_past(&History::softening, softening_at, report_.softening, start);
   }
-
-  /// Lets the step's largest densities soften bodies; `start` as above.
-  void end_softening(State<Dim>* start) {
-    const auto step = softening_step(setup_, next_.history);
+  template <typename Past>
+  void end_past(std::shared_ptr<const CellHistory> History::*past, const Past& step_at, double& dissipation,
+                State<Dim>* start) {
     if (start && !renumbering_.empty())
-      start->history.softening = step->end(next_.mesh, next_.history.x[0], before_.t).state;
-    auto end = step->end(next_.mesh, x_, next_.t);
-    next_.history.softening = std::move(end.state);
-    report_.softening = end.dissipation;
+      start->history.*past = step_at(before_.t)->end(next_.mesh, next_.history.x[0], before_.t).state;
+    auto end = step_at(next_.t)->end(next_.mesh, x_, next_.t);
+    next_.history.*past = std::move(end.state);
+    dissipation = end.dissipation;
     report_.history_loss += end.loss;
   }
 
