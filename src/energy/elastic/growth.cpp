@@ -55,7 +55,7 @@ template <int LawDim, int Dim>
 Mat<Dim> stress_in(const Mat<Dim>& G, const ElasticModuli& moduli) {
   const Growth& growth = moduli.growth;
   Mat<LawDim> P = elastic_stress<LawDim>(elastic_part<LawDim, Dim>(G, growth), without_growth(moduli));
-  if (!growth.is_subtracted) P = growth.volume * P * corner<LawDim>(growth.inverse);
+  if (!growth.is_subtracted) P = growth.volume * P * corner<LawDim>(growth.inverse).transpose();
   return P.template topLeftCorner<Dim, Dim>();
 }
 
@@ -66,7 +66,7 @@ EigenSystem<Dim> eigensystem_in(const Mat<Dim>& F, const ElasticModuli& moduli) 
       elastic_eigensystem<LawDim>(Mat<LawDim>(embed<LawDim, Dim>(F, 1) * inverse), without_growth(moduli));
   for (std::size_t k = 0; k < system.values.size(); ++k) {
     system.values[k] *= moduli.growth.volume;
-    system.modes[k] = Mat<LawDim>(system.modes[k] * inverse);
+    system.modes[k] = Mat<LawDim>(system.modes[k] * inverse.transpose());
   }
   if constexpr (LawDim == Dim) {
     return system;
