@@ -508,13 +508,13 @@ class ConditionReader {
 
   /// Whether a `threshold` gives this number to a side of a mesh's box: in PolyFEM's scenes no facet needs to be near it.
   bool is_side_of_box(int number) const {
-    constexpr int kRest = 7;
+    constexpr int kRest = 7;  // the number of what is at no side
     if (!is_polyfem_set(Node(geometry_.document()))) return false;
     for (const Node& geometry : geometry_.items())
       for (const Node& rule : geometry["surface_selection"].items())
         if (rule.json().is_object() && rule.has("threshold")) {
           const int side = number - rule["id_offset"].integer(0);
-          if (side > 0 && side <= kRest) return true;
+          if (side == kRest || (side > 0 && side <= 2 * Dim)) return true;
         }
     return false;
   }

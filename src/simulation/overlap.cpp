@@ -134,6 +134,7 @@ class OverlapResolver {
     if (!is_touching) return 0;
     push_apart();
     const StepReport report = settle();
+    refuse_bent_bodies();
     const double energy = report.energy.elastic + report.energy.contact;
     tell(penetrations, energy);
     return energy;
@@ -176,6 +177,25 @@ class OverlapResolver {
     if (!rigid_pair_.empty())
       refuse(rigid_pair_ + ", which are rigid and are not free to part",
              "rigid bodies apart, or one of them that deforms or that nothing holds");
+  }
+
+  /// Refuses a start at which rigid bodies have changed their shapes.
+  void refuse_bent_bodies() const {
+    constexpr double kBent = 1e-6;  // of an edge's length
+    const Mesh<Dim>& mesh = state_.mesh;
+    const auto length = [](const Vec<Dim>& from, const Vec<Dim>& to) { return (to - from).norm(); };
+    for (const CellId c : mesh.live_cells()) {
+      if (!rigid_body_of(setup_.materials.at(mesh.body(c)))) continue;
+      const auto at = [&](VertexId v) -> Vec<Dim> { return state_.history.x[0].template segment<Dim>(Dim * v); };
+      for (const VertexId v : mesh.cell(c))
+        for (const VertexId w : mesh.cell(c)) {
+          const double rest = length(mesh.rest(v), mesh.rest(w));
+          if (std::abs(length(at(v), at(w)) - rest) <= kBent * rest) continue;
+          refuse_rigid_pair();
+          refuse(fmt::format("body {}, which is rigid and is not free to part from what it overlaps", mesh.body(c)),
+                 "a rigid body apart from others, or one that nothing holds");
+        }
+    }
   }
 
   void refuse_self_crossing() const {
