@@ -40,9 +40,14 @@ void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
 }
 
+/// The components of a place, or without units of a unit vector, of which round-off is 0.
 std::string place_text(const Vec<3>& place, int dim, const Units* units) {
+  constexpr double kRoundOff = 1e-12;
   std::vector<std::string> numbers;
-  for (int c = 0; c < dim; ++c) numbers.push_back(fmt::format("{:.7g}", units ? units->from_si(place[c], "m") : place[c]));
+  for (int c = 0; c < dim; ++c) {
+    const double component = units ? units->from_si(place[c], "m") : std::abs(place[c]) < kRoundOff ? 0 : place[c];
+    numbers.push_back(fmt::format("{:.7g}", component));
+  }
   return fmt::format("({})", fmt::join(numbers, ", "));
 }
 
@@ -61,8 +66,8 @@ std::string describe(const Shape& shape, int dim, const Units& units) {
       return fmt::format("cone of {:.7g} degrees between surface and axis {}, apex {}", 180 / std::numbers::pi * shape.angle,
                          axis, center);
     case torus:
-      return fmt::format("torus of radii {} and {} (tube) around {}, axis {}", length(shape.radius), length(shape.tube_radius),
-                         center, axis);
+      return fmt::format("torus of radii {} and {} (tube) around {}, axis {}", length(shape.radius),
+                         length(shape.tube_radius), center, axis);
     case fitted:
       return "curves through its vertices";
   }
