@@ -10,13 +10,10 @@ import sys
 import tempfile
 import unittest
 
-import numpy as np
-
 SOURCE = pathlib.Path(sys.argv.pop())
 ITR = sys.argv.pop()
 RUBBER = SOURCE / "examples/rubber"
 sys.path.insert(0, str(RUBBER))
-import boot_3d  # noqa: E402
 import make  # noqa: E402
 import study  # noqa: E402
 
@@ -64,21 +61,6 @@ class Examples(unittest.TestCase):
             with open(study.STUDY / f"{name}.csv", newline="") as file:
                 errors = [abs(float(row["error [%]"])) for row in csv.DictReader(file)]
             self.assertLess(errors[-1], 3, name)
-
-    def test_boot_in_3d_is_that_of_the_axisymmetric_scene(self):
-        boot_3d.write(self.folder, 6, 24)
-        said = call("explain", self.folder / "boot_3d.json").stdout
-        self.assertIn("quadratic", said)
-        points, cells = boot_3d.half(32, 160, 1)
-        corners = points[cells]
-        volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
-        self.assertGreater(volumes.min(), 0)
-        section, triangles = make.mapped(make.boot, 1.4, 90, 0.4)
-        a, b, c = (section[triangles[:, k]] for k in range(3))
-        areas = np.cross(b - a, c - a) / 2
-        turned = np.pi * (areas * (a + b + c)[:, 0] / 3).sum()
-        self.assertAlmostEqual(volumes.sum() / turned, 1, delta=0.01)
-        self.assertTrue((points[:, 1] >= 0).all())
 
 
 if __name__ == "__main__":
