@@ -7,6 +7,8 @@
 #include <functional>
 #include <random>
 
+#include "advance.hpp"
+#include "energy/cell_field.hpp"
 #include "itr/solver.hpp"
 #include "random_cube.hpp"
 #include "random_mesh.hpp"
@@ -65,6 +67,31 @@ Mat<Dim> sheared() {
   F(1, 1) = 0.8;
   F(0, 1) = 0.4;
   return F;
+}
+
+/// Bodies of a material that fall, whose mesh changes: they lose energy, and their state is one of the present mesh.
+inline void expect_memory_where_meshes_change(const Material& material, double StepReport::*lost,
+                                              std::shared_ptr<const CellHistory> History::*state) {
+  auto setup = impact();
+  setup.materials[1] = material;
+  setup.time.steps = 20;
+  enable_remeshing(setup);
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  int splits = 0;
+  double sum = 0;
+  for (int k = 0; k < 12; ++k) {
+    const StepReport report = advance(simulation).report;
+    splits += report.splits.accepted;
+    EXPECT_GE(report.history_loss, 0);
+    EXPECT_GE(report.*lost, 0);
+    sum += report.*lost;
+    const auto& field = dynamic_cast<const CellField<2>&>(*(simulation.state().history.*state));
+    EXPECT_EQ(static_cast<int>(field.by_cell().size()), simulation.state().mesh.cell_slots());
+  }
+  EXPECT_GT(splits, 0);
+  EXPECT_GT(sum, 0);
+  expect_valid(simulation);
 }
 
 template <int Dim>

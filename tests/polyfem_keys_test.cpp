@@ -12,6 +12,7 @@
 #include "energy/contact/friction.hpp"
 #include "energy/elastic/law_sum.hpp"
 #include "energy/polyfem/adhesion.hpp"
+#include "energy/polyfem/adhesive_friction.hpp"
 #include "energy/polyfem/lagged_regularization.hpp"
 #include "itr/simulation.hpp"
 #include "itr/solver.hpp"
@@ -60,6 +61,25 @@ void expect_adhesion_derivatives(Scene scene, unsigned seed) {
   ASSERT_FALSE(sliding.empty());
   expect_derivatives(sliding, scene.x, 1e-7, 1e-5);
   expect_psd(sliding, scene.x);
+}
+
+/// In PolyFEM's way the Hessian is 0 where nothing has moved, and that of friction elsewhere; energy and forces stay.
+TEST(Adhesion, HasNoHessianAtRestByStep) {
+  ContactScene scene(1, false);
+  scene.options.adhesion = some_adhesion();
+  const AdhesionEnergy<2> adhesion(scene.surface, scene.options, 0.5);
+  Workspace workspace;
+  const auto make = [&](const VectorX& at_rest) {
+    return FrictionEnergy<2>(adhesion.pairs(), scene.x, AdhesionEnergy<2>::inner(workspace), scene.options, {20, at_rest},
+                             0.01);
+  };
+  const auto hessian = [&](const Energy& energy) { return hessian_of(energy, scene.x, PsdProjection::none); };
+  const VectorX elsewhere = scene.x.array() + 1e-3;
+  ASSERT_GT(hessian(make(scene.x)).norm(), 0);
+  EXPECT_EQ(hessian(AdhesiveFriction<2>(make(scene.x), scene.x)).norm(), 0);
+  const AdhesiveFriction<2> moved(make(elsewhere), elsewhere);
+  EXPECT_EQ(hessian(moved), hessian(make(elsewhere)));
+  EXPECT_EQ(moved.value(scene.x, workspace), make(elsewhere).value(scene.x, workspace));
 }
 
 TEST(Adhesion, DerivativesMatchDifferences) {

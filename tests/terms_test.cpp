@@ -60,8 +60,8 @@ TrialScene scene_of_all_terms() {
   VectorX x = 1.1 * scene.fields.x;
   const auto state = begin_viscous<2>(start, viscous, x, 0);
   scene.context.viscous = std::make_shared<ViscousStep<2>>(
-      std::dynamic_pointer_cast<const ViscousField<2>>(
-          ViscousStep<2>(std::dynamic_pointer_cast<const ViscousField<2>>(state), viscous, 0.1).end(start, x, 0.1).state),
+      std::dynamic_pointer_cast<const CellField<2>>(
+          ViscousStep<2>(std::dynamic_pointer_cast<const CellField<2>>(state), viscous, 0.1).end(start, x, 0.1).state),
       viscous, 0.1);
   auto softening = scene.context.materials;
   for (auto& [body, material] : softening) {
@@ -71,7 +71,7 @@ TrialScene scene_of_all_terms() {
   }
   for (Eigen::Index k = 0; k + 1 < x.size(); k += 2) x[k] += 0.5 * x[k + 1];  // growth alone stores no energy of shape
   scene.context.softening = std::make_shared<SofteningStep<2>>(
-      std::dynamic_pointer_cast<const SofteningField<2>>(begin_softening<2>(start, softening, x, 0)), softening);
+      std::dynamic_pointer_cast<const CellField<2>>(begin_softening<2>(start, softening, x, 0)), softening);
   scene.context.follower = [](const VectorX& x) {
     return std::vector<std::shared_ptr<const Energy>>{std::make_shared<LinearizedForces<2>>(VectorX(), x, 1)};
   };

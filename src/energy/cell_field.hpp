@@ -95,12 +95,10 @@ auto weights_of(const std::array<double, Columns>& weights) {
   return Eigen::Map<const Vec<static_cast<int>(Columns)>>(weights.data());
 }
 
-/// Records of a mesh at a time t: of cells whose body has a state by `update(cells, element, records)`, which returns their
+/// The state of a mesh at a time t: of cells whose body has one by `update(cells, element, records)`, which returns their
 /// dissipation and loss.
 template <int Dim, typename HasState, typename Update>
-std::pair<std::vector<typename CellField<Dim>::Records>, HistoryEnd> update_cells(const Mesh<Dim>& mesh,
-                                                                                  const HasState& has_state,
-                                                                                  const Update& update) {
+HistoryEnd update_cells(const Mesh<Dim>& mesh, double t, const HasState& has_state, const Update& update) {
   constexpr std::size_t kElements = 64;  // of a task
   const CellSet<Dim> cells = whole_mesh(mesh, {});
   std::vector<typename CellField<Dim>::Records> by_cell(cells.elements.size());
@@ -116,7 +114,8 @@ std::pair<std::vector<typename CellField<Dim>::Records>, HistoryEnd> update_cell
     end.dissipation += dissipation;
     end.loss += loss;
   }
-  return {std::move(by_cell), end};
+  end.state = std::make_shared<CellField<Dim>>(mesh, t, std::move(by_cell));
+  return end;
 }
 
 }  // namespace itr

@@ -73,13 +73,11 @@ void IncrementalPotential<Dim>::renew(const PotentialTerms<Dim>& terms, const Po
   renew_term(elastic_, is_in(TermKind::elastic, terms), cells_, terms.materials, terms.scaling, terms.quadrature_degree);
   viscous_.reset();
   if (terms.viscous)
-    viscous_ =
-        std::make_shared<ViscousEnergy<Dim>>("viscous", cells_, ViscousPast<Dim>(cells_, terms.viscous), terms.scaling,
-                                             degree_with_turn(terms.quadrature_degree, cells_.axisymmetric));
+    viscous_ = std::make_shared<ViscousEnergy<Dim>>("viscous", cells_, *terms.viscous, terms.scaling,
+                                                    degree_with_turn(terms.quadrature_degree, cells_.axisymmetric));
   softening_.reset();
   if (terms.softening)
-    softening_ = std::make_shared<SofteningEnergy<Dim>>("softening", cells_, SofteningPast<Dim>(cells_, terms.softening),
-                                                        terms.scaling, kStateDegree);
+    softening_ = std::make_shared<SofteningEnergy<Dim>>("softening", cells_, *terms.softening, terms.scaling, kStateDegree);
   renew_term(loads_, is_in(TermKind::loads, terms), cells_, terms.materials, terms.loads, terms.scaling);
   cavities_.clear();
   for (const CavityLoad& cavity : terms.loads.cavities)

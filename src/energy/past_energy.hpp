@@ -3,6 +3,7 @@
 #pragma once
 
 #include <utility>
+#include <vector>
 
 #include "core/parallel_reduce.hpp"
 #include "energy/cell_field.hpp"
@@ -12,14 +13,34 @@
 
 namespace itr {
 
-/// scale * integral over the rest shape of a density of the displacement gradient in space. `Past` has acts_on(element), and
-/// at(number, element, point) of its points, with density(G), stress(G) = dW/dF and hessian(G), by columns.
-template <int Dim, typename Past>
+/// scale * integral over the rest shape of a density of the displacement gradient in space, which each `Point` has:
+/// density(G), stress(G) = dW/dF and hessian(G), by columns.
+template <int Dim, typename Point>
 class PastEnergy final : public Energy, public IncrementalTerm {
  public:
-  /// `cells` must outlive this; `degree` is that of the quadrature where F varies in an element.
-  PastEnergy(const char* name, const CellSet<Dim>& cells, Past past, double scale, int degree)
-      : name_(name), cells_(cells), past_(std::move(past)), scale_(scale), degree_(degree) {}
+  /// Takes the points from a step, by acts_on(body), past(cells, element) and point_at(body, X, weights, past). `cells` and
+  /// `step` must outlive this; `degree` is that of the quadrature where F varies in an element.
+  template <typename Step>
+  PastEnergy(const char* name, const CellSet<Dim>& cells, const Step& step, double scale, int degree)
+      : name_(name), cells_(cells), first_{0}, scale_(scale), degree_(degree) {
+    for (const auto& element : cells.elements) {
+      const std::size_t count = is_constant(cells, element) ? 1 : quadrature<Dim>(degree).size();
+      first_.push_back(first_.back() + (step.acts_on(element.body) ? count : 0));
+    }
+    points_.resize(first_.back());
+    parallel_blocks(cells.elements.size(), kElements, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t e = begin; e < end; ++e) {
+        const auto& element = cells.elements[e];
+        if (first_[e] == first_[e + 1]) continue;
+        const auto past = step.past(cells, element);
+        std::size_t next = first_[e];
+        visit_sites(cells, element, degree, [&](const auto& site) {
+          const auto& weights = site.point.weights;
+          points_[next++] = step.point_at(element.body, rest_position<Dim>(cells, element, weights), weights, past);
+        });
+      }
+    });
+  }
   std::string_view name() const override { return name_; }
   double value(ConstVectorView x, Workspace&) const override { return value_of({cells_.rest, x}); }
   void add_gradient(ConstVectorView x, VectorView gradient, Workspace&) const override {
@@ -48,10 +69,11 @@ class PastEnergy final : public Energy, public IncrementalTerm {
   /// f(site, point) for the points of an element that has a past.
   template <typename F>
   void for_each_point(std::size_t e, const F& f) const {
-    const auto& element = cells_.elements[e];
-    if (!past_.acts_on(element)) return;
-    visit_sites(cells_, element, degree_, [&](const auto& site) {
-      if (site.turn > 0) f(site, past_.at(e, element, site.point));
+    if (first_[e] == first_[e + 1]) return;
+    std::size_t next = first_[e];
+    visit_sites(cells_, cells_.elements[e], degree_, [&](const auto& site) {
+      const Point& point = points_[next++];
+      if (site.turn > 0) f(site, point);
     });
   }
   double value_of(const Displacement<Dim>& u) const {
@@ -105,7 +127,8 @@ class PastEnergy final : public Energy, public IncrementalTerm {
 
   const char* name_;
   const CellSet<Dim>& cells_;
-  Past past_;
+  std::vector<std::size_t> first_;  ///< points of an element begin there, those of the next one behind them
+  std::vector<Point> points_;
   double scale_;
   int degree_;
 };

@@ -17,9 +17,8 @@ double integral_of_erf(double z) { return z * std::erf(z) + std::expm1(-z * z) *
 
 /// The law's part of shape at a point of a body.
 template <int Dim>
-ElasticModuli shape_at(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element,
-                       const std::array<double, Dim + 1>& weights, const Material& material) {
-  return shape_part(elastic_moduli<3>(material, point_in_space<Dim>(rest_position<Dim>(cells, element, weights))));
+ElasticModuli shape_at(const Material& material, const Vec<Dim>& X) {
+  return shape_part(elastic_moduli<3>(material, point_in_space<Dim>(X)));
 }
 
 double shape_density(const Mat<3>& G, const ElasticModuli& shape) {
@@ -50,7 +49,7 @@ LostDensity lost_density(const MullinsSoftening& mullins, double largest) {
 }
 
 template <int Dim>
-SofteningStep<Dim>::SofteningStep(std::shared_ptr<const SofteningField<Dim>> start, const std::map<int, Material>& materials)
+SofteningStep<Dim>::SofteningStep(std::shared_ptr<const CellField<Dim>> start, const std::map<int, Material>& materials)
     : start_(std::move(start)) {
   for (const auto& [body, material] : materials)
     if (material.mullins) materials_.emplace(body, material);
@@ -78,7 +77,8 @@ typename SofteningStep<Dim>::Cell SofteningStep<Dim>::update(const CellSet<Dim>&
     const auto& weights = site.point.weights;
     const double old = largest_at<Dim>(before, weights);
     const Mat<3> G = gradient_in_space(site.displacement_gradient(u).G);
-    const double largest = std::max(old, shape_density(G, shape_at<Dim>(cells, element, weights, material)));
+    const ElasticModuli shape = shape_at<Dim>(material, rest_position<Dim>(cells, element, weights));
+    const double largest = std::max(old, shape_density(G, shape));
     const LostDensity lost_before = lost_density(*material.mullins, old);
     cell.records(0, q++) = largest;
     cell.lost += site.weight(1) * lost_density(*material.mullins, largest).value;
@@ -101,15 +101,13 @@ double SofteningStep<Dim>::lost(const CellSet<Dim>& cells, ConstVectorView x) co
 
 template <int Dim>
 HistoryEnd SofteningStep<Dim>::end(const Mesh<Dim>& mesh, ConstVectorView x, double t) const {
-  auto [by_cell, end] = update_cells(
-      mesh, [&](int body) { return acts_on(body); },
+  return update_cells(
+      mesh, t, [&](int body) { return acts_on(body); },
       [&](const CellSet<Dim>& cells, const auto& element, Records& records) -> std::array<double, 2> {
         Cell cell = update(cells, element, x);
         records = std::move(cell.records);
         return {cell.lost - cell.lost_before, cell.displaced};
       });
-  end.state = std::make_shared<SofteningField<Dim>>(mesh, t, std::move(by_cell));
-  return end;
 }
 
 template <int Dim>
@@ -120,42 +118,26 @@ std::shared_ptr<const CellHistory> begin_softening(const Mesh<Dim>& mesh, const 
   std::vector<Records> at_rest;
   for (CellId c = 0; c < mesh.cell_slots(); ++c)
     at_rest.push_back(Records::Zero(materials.at(mesh.body(c)).mullins ? 1 : 0, Dim + 1));
-  const auto start = std::make_shared<SofteningField<Dim>>(mesh, t, std::move(at_rest));
+  const auto start = std::make_shared<CellField<Dim>>(mesh, t, std::move(at_rest));
   return SofteningStep<Dim>(start, materials).end(mesh, x, t).state;
 }
 
 template <int Dim>
-SofteningPast<Dim>::SofteningPast(const CellSet<Dim>& cells, std::shared_ptr<const SofteningStep<Dim>> step)
-    : cells_(cells), step_(std::move(step)), by_element_(cells.elements.size()) {
-  parallel_blocks(by_element_.size(), kElements, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e)
-      if (acts_on(cells.elements[e])) by_element_[e] = step_->largest(cells, cells.elements[e]);
-  });
-}
-
-template <int Dim>
-typename SofteningPast<Dim>::Point SofteningPast<Dim>::at(std::size_t e, const typename CellSet<Dim>::Element& element,
-                                                          const QuadraturePoint<Dim>& point) const {
-  const Material& material = step_->material(element.body);
-  return {*material.mullins, shape_at<Dim>(cells_, element, point.weights, material),
-          largest_at<Dim>(by_element_[e], point.weights)};
+SofteningPoint softening_point(const Material& material, const Vec<Dim>& X, const std::array<double, Dim + 1>& weights,
+                               const typename CellField<Dim>::Records& largest) {
+  return {*material.mullins, shape_at<Dim>(material, X), largest_at<Dim>(largest, weights)};
 }
 
 /// Where det F <= 0 the law itself is infinite.
-template <int Dim>
-double SofteningPast<Dim>::Point::density(const Mat<3>& G) const {
-  return softening(mullins, shape_density(G, shape), largest).value;
-}
+double SofteningPoint::density(const Mat<3>& G) const { return softening(mullins, shape_density(G, shape), largest).value; }
 
-template <int Dim>
-Mat<3> SofteningPast<Dim>::Point::stress(const Mat<3>& G) const {
+Mat<3> SofteningPoint::stress(const Mat<3>& G) const {
   const SofteningResponse response = softening(mullins, shape_density(G, shape), largest);
   if (response.first == 0) return Mat<3>::Zero();
   return response.first * elastic_stress<3>(DisplacementGradient<3>{G}, shape);
 }
 
-template <int Dim>
-Mat<9> SofteningPast<Dim>::Point::hessian(const Mat<3>& G) const {
+Mat<9> SofteningPoint::hessian(const Mat<3>& G) const {
   const SofteningResponse response = softening(mullins, shape_density(G, shape), largest);
   if (response.second == 0 && response.first == 0) return Mat<9>::Zero();
   const Mat<3> P = elastic_stress<3>(DisplacementGradient<3>{G}, shape);
@@ -174,21 +156,20 @@ std::pair<Mat<3>, double> softening_of_state(const typename CellField<Dim>::Reco
                                              const std::array<double, Dim + 1>& weights, const Material& material,
                                              const Vec<Dim>& X, const Mat<3>& F) {
   if (records.rows() == 0) return {Mat<3>::Zero(), 0};
-  const typename SofteningPast<Dim>::Point point{
-      *material.mullins, shape_part(elastic_moduli<3>(material, point_in_space<Dim>(X))), largest_at<Dim>(records, weights)};
+  const SofteningPoint point = softening_point<Dim>(material, X, weights, records);
   const Mat<3> G = F - Mat<3>::Identity();
   const double largest = std::max(point.largest, shape_density(G, point.shape));
   return {point.stress(G) * F.transpose() / F.determinant(), point.density(G) - lost_density(point.mullins, largest).value};
 }
 
-#define ITR_INSTANTIATE(Dim)                                                                                      \
-  template class SofteningField<Dim>;                                                                             \
-  template class SofteningStep<Dim>;                                                                              \
-  template class SofteningPast<Dim>;                                                                              \
-  template std::shared_ptr<const CellHistory> begin_softening(const Mesh<Dim>&, const std::map<int, Material>&,   \
-                                                              ConstVectorView, double);                           \
-  template std::pair<Mat<3>, double> softening_of_state<Dim>(const typename CellField<Dim>::Records&,             \
-                                                             const std::array<double, Dim + 1>&, const Material&, \
+#define ITR_INSTANTIATE(Dim)                                                                                         \
+  template class SofteningStep<Dim>;                                                                                 \
+  template SofteningPoint softening_point<Dim>(const Material&, const Vec<Dim>&, const std::array<double, Dim + 1>&, \
+                                               const typename CellField<Dim>::Records&);                             \
+  template std::shared_ptr<const CellHistory> begin_softening(const Mesh<Dim>&, const std::map<int, Material>&,      \
+                                                              ConstVectorView, double);                              \
+  template std::pair<Mat<3>, double> softening_of_state<Dim>(const typename CellField<Dim>::Records&,                \
+                                                             const std::array<double, Dim + 1>&, const Material&,    \
                                                              const Vec<Dim>&, const Mat<3>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

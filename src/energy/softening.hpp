@@ -3,6 +3,7 @@
 // that of the law, plus a function of the law's energy density of shape W where that is below its largest value of the past.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <utility>
@@ -26,17 +27,27 @@ struct LostDensity {
 };
 LostDensity lost_density(const MullinsSoftening& mullins, double largest);
 
-/// The state of softening bodies at one time: a record is the largest W of the past.
-template <int Dim>
-class SofteningField final : public CellField<Dim> {
- public:
-  using CellField<Dim>::CellField;
-};
-
-/// The state of bodies that are at positions x and were nowhere else; null where none softens.
+/// The state of bodies that are at positions x and were nowhere else, a CellField of the largest W of the past; null where
+/// none softens.
 template <int Dim>
 std::shared_ptr<const CellHistory> begin_softening(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
                                                    ConstVectorView x, double t);
+
+/// The past at a point, for PastEnergy.
+struct SofteningPoint {
+  MullinsSoftening mullins{};
+  ElasticModuli shape{};  ///< of the law's part that resists changes of shape
+  double largest = 0;     ///< the largest W of the past
+
+  double density(const Mat<3>& G) const;
+  Mat<3> stress(const Mat<3>& G) const;
+  Mat<9> hessian(const Mat<3>& G) const;
+};
+
+/// Takes the largest W at the vertices of the element of a rest position X.
+template <int Dim>
+SofteningPoint softening_point(const Material& material, const Vec<Dim>& X, const std::array<double, Dim + 1>& weights,
+                               const typename CellField<Dim>::Records& largest);
 
 /// A step of softening bodies.
 template <int Dim>
@@ -44,12 +55,16 @@ class SofteningStep {
  public:
   using Records = typename CellField<Dim>::Records;
 
-  SofteningStep(std::shared_ptr<const SofteningField<Dim>> start, const std::map<int, Material>& materials);
+  SofteningStep(std::shared_ptr<const CellField<Dim>> start, const std::map<int, Material>& materials);
   bool acts_on(int body) const { return materials_.contains(body); }
-  const Material& material(int body) const { return materials_.at(body); }
   /// The largest W of the past at the vertices of an element.
-  Records largest(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const {
+  Records past(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const {
     return start_->on(cells, element);
+  }
+  /// The past of a body at its rest position X, by the past of its element.
+  SofteningPoint point_at(int body, const Vec<Dim>& X, const std::array<double, Dim + 1>& weights,
+                          const Records& past) const {
+    return softening_point<Dim>(materials_.at(body), X, weights, past);
   }
   /// Energy that has been lost at the end of a step to x, and before, without scale [J]: the potential's part that bodies do
   /// not get back.
@@ -62,35 +77,13 @@ class SofteningStep {
   struct Cell;
   Cell update(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, ConstVectorView x) const;
 
-  std::shared_ptr<const SofteningField<Dim>> start_;
+  std::shared_ptr<const CellField<Dim>> start_;
   std::map<int, Material> materials_;  ///< of bodies that soften
 };
 
-/// The past of the elements of `cells`, for PastEnergy of kStateDegree: where W is compared with its largest value.
+/// Compares W with its largest value at the points of kStateDegree.
 template <int Dim>
-class SofteningPast {
- public:
-  SofteningPast(const CellSet<Dim>& cells, std::shared_ptr<const SofteningStep<Dim>> step);
-  struct Point {
-    const MullinsSoftening& mullins;
-    ElasticModuli shape;  ///< of the law's part that resists changes of shape
-    double largest;
-
-    double density(const Mat<3>& G) const;
-    Mat<3> stress(const Mat<3>& G) const;
-    Mat<9> hessian(const Mat<3>& G) const;
-  };
-  bool acts_on(const typename CellSet<Dim>::Element& element) const { return step_->acts_on(element.body); }
-  Point at(std::size_t e, const typename CellSet<Dim>::Element& element, const QuadraturePoint<Dim>& point) const;
-
- private:
-  const CellSet<Dim>& cells_;
-  std::shared_ptr<const SofteningStep<Dim>> step_;
-  std::vector<typename SofteningStep<Dim>::Records> by_element_;
-};
-
-template <int Dim>
-using SofteningEnergy = PastEnergy<Dim, SofteningPast<Dim>>;
+using SofteningEnergy = PastEnergy<Dim, SofteningPoint>;
 
 /// Cauchy stress in space [Pa] and energy density that softening adds to those of the law of a body that has come to F, at
 /// the point X with barycentric coordinates `weights` of a cell with these records.

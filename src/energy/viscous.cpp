@@ -76,6 +76,10 @@ Mat<9> grown(const Mat<9>& hessian, const Growth& growth) {
   return growth.volume * change * hessian * change;
 }
 
+Growth growth_of(const Material& material, const Vec<3>& X) {
+  return material.eigenstrain ? growth_at<3>(material, X) : Growth{};
+}
+
 }  // namespace
 
 ShapeMeasure shape_measure(const Material& material) {
@@ -140,7 +144,7 @@ ViscousWeights::ViscousWeights(const PronyTerm& term, double dt) : g(term.g) {
 }
 
 template <int Dim>
-ViscousStep<Dim>::ViscousStep(std::shared_ptr<const ViscousField<Dim>> start, const std::map<int, Material>& materials,
+ViscousStep<Dim>::ViscousStep(std::shared_ptr<const CellField<Dim>> start, const std::map<int, Material>& materials,
                               double dt)
     : start_(std::move(start)) {
   for (const auto& [body, material] : materials) {
@@ -160,13 +164,12 @@ double ViscousStep<Dim>::factor(int body) const {
 template <int Dim>
 typename ViscousStep<Dim>::Stress ViscousStep<Dim>::past(const CellSet<Dim>& cells,
                                                          const typename CellSet<Dim>::Element& element) const {
-  using Field = ViscousField<Dim>;
   const Records records = start_->on(cells, element);
   Stress H = Stress::Zero();
-  Eigen::Index row = Field::kOfLaw;
+  Eigen::Index row = ViscousRecord::kOfLaw;
   for (const ViscousWeights& w : weights_.at(element.body)) {
     H -= w.decay * records.template middleRows<6>(row) + w.g * w.carried * records.template topRows<6>();
-    row += Field::kOfTerm;
+    row += ViscousRecord::kOfTerm;
   }
   return H;
 }
@@ -182,7 +185,6 @@ template <int Dim>
 typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cells,
                                                          const typename CellSet<Dim>::Element& element,
                                                          ConstVectorView x) const {
-  using Field = ViscousField<Dim>;
   VectorX variance;
   const Records before = start_->on(cells, element, &variance);
   const Material& material = materials_.at(element.body);
@@ -200,25 +202,25 @@ typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cel
     auto now = cell.records.col(q++);
     const Voigt S_before = old.head<6>();
     now.template head<6>() = law.S;
-    now[Field::kDensity] = law.density;
-    now[Field::kProduct] = product(law.S, law.M) / 2;
-    const double change = product(S_before, law.M) / 2 - old[Field::kProduct];  // S : dM / 2 with the S before
-    const double rest = law.density - old[Field::kDensity] - change;
-    Eigen::Index row = Field::kOfLaw;
+    now[ViscousRecord::kDensity] = law.density;
+    now[ViscousRecord::kProduct] = product(law.S, law.M) / 2;
+    const double change = product(S_before, law.M) / 2 - old[ViscousRecord::kProduct];  // S : dM / 2 with the S before
+    const double rest = law.density - old[ViscousRecord::kDensity] - change;
+    Eigen::Index row = ViscousRecord::kOfLaw;
     double dissipation = 0, excess = 0;
     for (const ViscousWeights& w : weights) {
       const Voigt Q_before = old.segment<6>(row);
-      const double energy_before = old[row + Field::kDensity];
-      const double change_by_past = w.g * change - (product(Q_before, law.M) / 2 - old[row + Field::kProduct]);
+      const double energy_before = old[row + ViscousRecord::kDensity];
+      const double change_by_past = w.g * change - (product(Q_before, law.M) / 2 - old[row + ViscousRecord::kProduct]);
       const Voigt Q = w.decay * Q_before + w.g * (w.carried * S_before + w.relaxed * law.S);
       const double energy = w.decay * (energy_before + change_by_past) + 2 * w.g * w.stored * rest;
       dissipation += w.left * change_by_past + 2 * w.g * w.work * rest + energy_before - energy;
       excess += energy - w.g * w.left * law.density +
                 (w.decay * product(Q_before, law.M) + w.g * w.carried * product(S_before, law.M)) / 2;
       now.template segment<6>(row) = Q;
-      now[row + Field::kDensity] = energy;
-      now[row + Field::kProduct] = product(Q, law.M) / 2;
-      row += Field::kOfTerm;
+      now[row + ViscousRecord::kDensity] = energy;
+      now[row + ViscousRecord::kProduct] = product(Q, law.M) / 2;
+      row += ViscousRecord::kOfTerm;
     }
     cell.dissipation += weight * law.volume * dissipation;
     cell.stored_excess += weight * law.volume * excess;
@@ -226,13 +228,13 @@ typename ViscousStep<Dim>::Cell ViscousStep<Dim>::update(const CellSet<Dim>& cel
     shear = elastic_moduli<3>(material, X).lame.mu;
   });
   cell.records = at_vertices<Dim>(cell.records, q);
-  Eigen::Index row = Field::kOfLaw;
+  Eigen::Index row = ViscousRecord::kOfLaw;
   for (const ViscousWeights& w : weights) {
     if (variance.size() > 0) {
       const Voigt squares = variance.segment<6>(row);
       cell.loss += volume * (squares.head<3>().sum() + 2 * squares.tail<3>().sum()) / (4 * shear * w.g);
     }
-    row += Field::kOfTerm;
+    row += ViscousRecord::kOfTerm;
   }
   return cell;
 }
@@ -249,27 +251,23 @@ double ViscousStep<Dim>::stored_excess(const CellSet<Dim>& cells, ConstVectorVie
 
 template <int Dim>
 HistoryEnd ViscousStep<Dim>::end(const Mesh<Dim>& mesh, ConstVectorView x, double t) const {
-  auto [by_cell, end] = update_cells(
-      mesh, [&](int body) { return acts_on(body); },
+  return update_cells(
+      mesh, t, [&](int body) { return acts_on(body); },
       [&](const CellSet<Dim>& cells, const auto& element, Records& records) -> std::array<double, 2> {
         Cell cell = update(cells, element, x);
         records = std::move(cell.records);
         return {cell.dissipation, cell.loss};
       });
-  end.state = std::make_shared<ViscousField<Dim>>(mesh, t, std::move(by_cell));
-  return end;
 }
 
 template <int Dim>
 std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>& mesh, const std::map<int, Material>& materials,
                                                  ConstVectorView x, double t, bool has_relaxed) {
-  using Field = ViscousField<Dim>;
+  using Field = CellField<Dim>;
   if (std::ranges::all_of(materials, [](const auto& entry) { return entry.second.prony.empty(); })) return nullptr;
   std::vector<typename Field::Records> at_rest;
-  for (CellId c = 0; c < mesh.cell_slots(); ++c) {
-    const auto terms = static_cast<Eigen::Index>(materials.at(mesh.body(c)).prony.size());
-    at_rest.push_back(Field::Records::Zero(terms == 0 ? 0 : Field::kOfLaw + Field::kOfTerm * terms, Dim + 1));
-  }
+  for (CellId c = 0; c < mesh.cell_slots(); ++c)
+    at_rest.push_back(Field::Records::Zero(ViscousRecord::size(materials.at(mesh.body(c))), Dim + 1));
   const double dt = has_relaxed ? std::numeric_limits<double>::infinity() : 0;
   const auto state = ViscousStep<Dim>(std::make_shared<Field>(mesh, t, at_rest), materials, dt).end(mesh, x, t).state;
   std::vector<typename Field::Records> records = std::dynamic_pointer_cast<const Field>(state)->by_cell();
@@ -283,65 +281,49 @@ std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>& mesh, const st
 }
 
 template <int Dim>
-ViscousPast<Dim>::ViscousPast(const CellSet<Dim>& cells, std::shared_ptr<const ViscousStep<Dim>> step)
-    : cells_(&cells), step_(std::move(step)), by_element_(cells.elements.size()) {
-  parallel_blocks(by_element_.size(), kElements, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e)
-      if (acts_on(cells.elements[e]))
-        by_element_[e] = step_->past(cells, cells.elements[e]);
-      else
-        by_element_[e].setZero();
-  });
+ViscousPoint ViscousStep<Dim>::point_at(int body, const Vec<Dim>& X, const std::array<double, Dim + 1>& weights,
+                                        const Stress& past) const {
+  const Material& material = materials_.at(body);
+  return {shape_measure(material), tensor(past * weights_of(weights)), growth_of(material, point_in_space<Dim>(X))};
 }
 
-template <int Dim>
-typename ViscousPast<Dim>::Point ViscousPast<Dim>::at(std::size_t e, const typename CellSet<Dim>::Element& element,
-                                                      const QuadraturePoint<Dim>& point) const {
-  const Material& material = step_->material(element.body);
-  Growth growth;
-  if (material.eigenstrain)
-    growth = growth_at<3>(material, point_in_space<Dim>(rest_position<Dim>(*cells_, element, point.weights)));
-  return {shape_measure(material), tensor(by_element_[e] * weights_of(point.weights)), growth};
+double ViscousPoint::density(const Mat<3>& G) const {
+  return volume_ratio(growth) * past_density(measure, elastic_gradient(G, growth), H);
 }
 
-template <int Dim>
-Mat<3> ViscousPast<Dim>::Point::stress(const Mat<3>& G) const {
+Mat<3> ViscousPoint::stress(const Mat<3>& G) const {
   return grown(past_stress(measure, elastic_gradient(G, growth), H), growth);
 }
 
-template <int Dim>
-Mat<9> ViscousPast<Dim>::Point::hessian(const Mat<3>& G) const {
+Mat<9> ViscousPoint::hessian(const Mat<3>& G) const {
   return grown(past_hessian(measure, elastic_gradient(G, growth) + Mat<3>::Identity(), H), growth);
 }
 
 template <int Dim>
-std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Records& records,
+std::pair<Mat<3>, double> past_of_state(const typename CellField<Dim>::Records& records,
                                         const std::array<double, Dim + 1>& weights, const Material& material,
                                         const Vec<3>& X, const Mat<3>& F) {
-  using Field = ViscousField<Dim>;
   if (records.rows() == 0) return {Mat<3>::Zero(), 0};
   const VectorX here = records * weights_of(weights);
   Voigt Q = Voigt::Zero();
   double density = 0;
   for (std::size_t i = 0; i < material.prony.size(); ++i) {
-    const Eigen::Index row = Field::kOfLaw + Field::kOfTerm * static_cast<Eigen::Index>(i);
+    const Eigen::Index row = ViscousRecord::kOfLaw + ViscousRecord::kOfTerm * static_cast<Eigen::Index>(i);
     Q += here.segment<6>(row);
-    density += here[row + Field::kDensity] - material.prony[i].g * here[Field::kDensity];
+    density += here[row + ViscousRecord::kDensity] - material.prony[i].g * here[ViscousRecord::kDensity];
   }
-  const Growth growth = material.eigenstrain ? growth_at<3>(material, X) : Growth{};
-  const Mat<3> G = elastic_gradient(Mat<3>(F - Mat<3>::Identity()), growth);
-  const Mat<3> P = grown(past_stress(shape_measure(material), G, tensor(-Q)), growth);
-  return {P * F.transpose() / F.determinant(), volume_ratio(growth) * density};
+  const ViscousPoint point{shape_measure(material), tensor(-Q), growth_of(material, X)};
+  const Mat<3> P = point.stress(F - Mat<3>::Identity());
+  return {P * F.transpose() / F.determinant(), volume_ratio(point.growth) * density};
 }
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
   template class ViscousStep<Dim>;                                                                                          \
-  template class ViscousPast<Dim>;                                                                                          \
+                                                                                                                            \
   template std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&,               \
                                                             ConstVectorView, double, bool);                                 \
-  template std::pair<Mat<3>, double> past_of_state<Dim>(const ViscousField<Dim>::Records&,                                  \
-                                                        const std::array<double, Dim + 1>&, const Material&, const Vec<3>&, \
-                                                        const Mat<3>&);
+  template std::pair<Mat<3>, double> past_of_state<Dim>(const CellField<Dim>::Records&, const std::array<double, Dim + 1>&, \
+                                                        const Material&, const Vec<3>&, const Mat<3>&);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 
 }  // namespace itr

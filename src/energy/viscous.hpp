@@ -3,6 +3,8 @@
 // of a law with other moduli, plus H : M(F) / 2 with a constant H of the past and a measure M of the change of shape.
 #pragma once
 
+#include <array>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <utility>
@@ -24,14 +26,14 @@ double past_density(ShapeMeasure measure, const Mat<3>& G, const Mat<3>& H);
 Mat<3> past_stress(ShapeMeasure measure, const Mat<3>& G, const Mat<3>& H);
 Mat<9> past_hessian(ShapeMeasure measure, const Mat<3>& F, const Mat<3>& H);
 
-/// The state of viscoelastic bodies at one time. A record has of the instantaneous law the stress S = 2 dW/dM, the density W
-/// and S : M / 2, and of each term of the series the stress Q that has relaxed, the energy E that the term stores and Q : M
-/// / 2.
-template <int Dim>
-class ViscousField final : public CellField<Dim> {
- public:
-  using CellField<Dim>::CellField;
-  static constexpr int kOfLaw = 8, kOfTerm = 8, kDensity = 6, kProduct = 7;
+/// A record of a CellField of viscoelastic bodies: of the instantaneous law the stress S = 2 dW/dM, the density W and S : M
+/// / 2, and of each term of the series the stress Q that has relaxed, the energy E that the term stores and Q : M / 2.
+struct ViscousRecord {
+  static constexpr Eigen::Index kOfLaw = 8, kOfTerm = 8, kDensity = 6, kProduct = 7;
+
+  static Eigen::Index size(const Material& material) {
+    return material.prony.empty() ? 0 : kOfLaw + kOfTerm * std::ssize(material.prony);
+  }
 };
 
 /// The state of bodies that come to positions x at once, or have long been there; null where none is viscoelastic. Cells
@@ -50,23 +52,34 @@ struct ViscousWeights {
   ViscousWeights(const PronyTerm& term, double dt);
 };
 
+/// The past at a point, for PastEnergy: H : M(F) / 2.
+struct ViscousPoint {
+  ShapeMeasure measure = ShapeMeasure::isochoric;
+  Mat<3> H = Mat<3>::Zero();
+  Growth growth{};
+
+  double density(const Mat<3>& G) const;
+  Mat<3> stress(const Mat<3>& G) const;
+  Mat<9> hessian(const Mat<3>& G) const;
+};
+
 /// A step of viscoelastic bodies: stresses of the law change evenly over its length.
 template <int Dim>
 class ViscousStep {
  public:
-  using Records = typename ViscousField<Dim>::Records;
+  using Records = typename CellField<Dim>::Records;
   using Stress = Eigen::Matrix<double, 6, Dim + 1>;  ///< 00, 11, 22, 01, 02, 12 at the vertices of a cell [Pa]
 
   /// `materials` are those of the setup at the end of the step, `dt` may be 0 or infinite [s].
-  ViscousStep(std::shared_ptr<const ViscousField<Dim>> start, const std::map<int, Material>& materials, double dt);
+  ViscousStep(std::shared_ptr<const CellField<Dim>> start, const std::map<int, Material>& materials, double dt);
 
   /// Share of the instantaneous moduli of shape that act on changes over the step.
   double factor(int body) const;
-  ShapeMeasure measure(int body) const { return shape_measure(material(body)); }
-  const Material& material(int body) const { return materials_.at(body); }
   bool acts_on(int body) const { return materials_.contains(body); }
   /// H in an element.
   Stress past(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element) const;
+  /// The past of a body at its rest position X, by the past of its element.
+  ViscousPoint point_at(int body, const Vec<Dim>& X, const std::array<double, Dim + 1>& weights, const Stress& past) const;
   /// Energy that the bodies store at x beyond the potential's, without scale [J].
   double stored_excess(const CellSet<Dim>& cells, ConstVectorView x) const;
 
@@ -77,43 +90,18 @@ class ViscousStep {
   struct Cell;
   Cell update(const CellSet<Dim>& cells, const typename CellSet<Dim>::Element& element, ConstVectorView x) const;
 
-  std::shared_ptr<const ViscousField<Dim>> start_;
+  std::shared_ptr<const CellField<Dim>> start_;
   std::map<int, Material> materials_;  ///< viscoelastic ones
   std::map<int, std::vector<ViscousWeights>> weights_;
 };
 
-/// The past of the elements of `cells`, for PastEnergy: H : M(F) / 2.
 template <int Dim>
-class ViscousPast {
- public:
-  ViscousPast(const CellSet<Dim>& cells, std::shared_ptr<const ViscousStep<Dim>> step);
-  struct Point {
-    ShapeMeasure measure;
-    Mat<3> H;
-    Growth growth;
-
-    double density(const Mat<3>& G) const {
-      return volume_ratio(growth) * past_density(measure, elastic_gradient(G, growth), H);
-    }
-    Mat<3> stress(const Mat<3>& G) const;
-    Mat<9> hessian(const Mat<3>& G) const;
-  };
-  bool acts_on(const typename CellSet<Dim>::Element& element) const { return step_->acts_on(element.body); }
-  Point at(std::size_t e, const typename CellSet<Dim>::Element& element, const QuadraturePoint<Dim>& point) const;
-
- private:
-  const CellSet<Dim>* cells_;
-  std::shared_ptr<const ViscousStep<Dim>> step_;
-  std::vector<typename ViscousStep<Dim>::Stress> by_element_;  ///< 0 in elastic ones
-};
-
-template <int Dim>
-using ViscousEnergy = PastEnergy<Dim, ViscousPast<Dim>>;
+using ViscousEnergy = PastEnergy<Dim, ViscousPoint>;
 
 /// Cauchy stress in space [Pa] and energy density that the past of a body adds to those of its instantaneous law, at the
 /// rest position X, a point with barycentric coordinates `weights` of a cell with these records.
 template <int Dim>
-std::pair<Mat<3>, double> past_of_state(const typename ViscousField<Dim>::Records& records,
+std::pair<Mat<3>, double> past_of_state(const typename CellField<Dim>::Records& records,
                                         const std::array<double, Dim + 1>& weights, const Material& material,
                                         const Vec<3>& X, const Mat<3>& F);
 

@@ -301,10 +301,10 @@ void write_cells(hdf5::File& file, const std::string& group, const std::shared_p
 }
 
 /// Null where the file has none.
-template <int Dim, typename Field>
+template <int Dim>
 std::shared_ptr<const CellHistory> read_cells(const fs::path& path, const hdf5::File& file, const std::string& group,
                                               const State<Dim>& state) {
-  using Records = typename Field::Records;
+  using Records = typename CellField<Dim>::Records;
   const std::string of_time = group + "/t", of_rows = group + "/rows", of_records = group + "/records";
   if (!file.contains(of_time)) return nullptr;
   const auto refuse = [&](const std::string& name, const std::string& found, const std::string& expected) {
@@ -323,7 +323,7 @@ std::shared_ptr<const CellHistory> read_cells(const fs::path& path, const hdf5::
     by_cell.emplace_back(Eigen::Map<const Records>(records.data() + begin, n, Dim + 1));
     begin += size;
   }
-  return std::make_shared<Field>(state.mesh, t[0], std::move(by_cell));
+  return std::make_shared<CellField<Dim>>(state.mesh, t[0], std::move(by_cell));
 }
 
 template <int Dim>
@@ -470,8 +470,8 @@ Checkpoint<Dim> read_checkpoint(const SavedState& saved) {
   state.history.damp_next = guard[1] != 0;
   state.stored_energy = guard[2];
   if (file.contains(kStepControl)) read_step_control(saved.file, file, state);
-  state.history.viscous = read_cells<Dim, ViscousField<Dim>>(saved.file, file, kViscous, state);
-  state.history.softening = read_cells<Dim, SofteningField<Dim>>(saved.file, file, kSoftening, state);
+  state.history.viscous = read_cells(saved.file, file, kViscous, state);
+  state.history.softening = read_cells(saved.file, file, kSoftening, state);
   state.remesh_memory = read_memory(saved.file, file, state.mesh.num_vertices());
   state.strata = read_strata<Dim>(saved.file, file, state.mesh);
   state.factor = read_factor(saved.file, file);

@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "core/sorted.hpp"
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
 #include "shapes.hpp"
@@ -27,12 +28,6 @@ struct Surface {
   std::vector<Triangle> triangles;
   std::vector<char> is_used;  ///< per point; points inside of a solid are not
 };
-
-template <std::size_t N>
-std::array<int, N> sorted(std::array<int, N> vertices) {
-  std::sort(vertices.begin(), vertices.end());
-  return vertices;
-}
 
 /// Adds an edge unless it is there in either direction.
 class EdgeList {
@@ -175,7 +170,6 @@ class ShapedSurface {
   void refine() {
     constexpr int kMostRounds = 16;
     constexpr std::size_t kMostEdges = 2'000'000;
-    check_distance();
     for (std::size_t v = 0; v < points_.size(); ++v)
       if (surface_.is_used[v]) put_on(points_[v]);
     for (int round = 0; round < kMostRounds && mark(); ++round) {
@@ -186,20 +180,6 @@ class ShapedSurface {
   }
 
  private:
-  void check_distance() const {
-    constexpr double kFar = 0.05;  // of the diagonal, as surfaces of bodies
-    Eigen::AlignedBox<double, Dim> box;
-    double farthest = 0;
-    for (const Edge& edge : surface_.edges)
-      for (const int v : edge) {
-        box.extend(points_[v]);
-        farthest = std::max(farthest, std::abs(offset_from(shape_, in_space(points_[v])).distance));
-      }
-    if (farthest > kFar * box.diagonal().norm())
-      entry_.node.fail(fmt::format("a geometry that a vertex of its obstacle is {} off",
-                                   entry_.node.document().units.text(farthest, "m", 3)),
-                       "one that all vertices of the obstacle lie on");
-  }
   /// Moves a point to the nearest place of the shape: one step is exact but at curves.
   void put_on(Vec<Dim>& point) const {
     for (int i = 0; i < 2; ++i) {

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <numbers>
 #include <set>
@@ -114,6 +115,29 @@ std::vector<SurfaceTriangle> triangles_of(const Mesh<Dim>& mesh, const std::vect
   return triangles;
 }
 
+double diagonal_of(std::span<const SurfaceTriangle> triangles) {
+  Eigen::AlignedBox<double, 3> box;
+  for (const SurfaceTriangle& triangle : triangles)
+    for (const Vec<3>& corner : triangle) box.extend(corner);
+  return box.diagonal().norm();
+}
+
+/// Vertices that a surface begins with are moved onto their shape, but not far: as far as one is that refines a polygon.
+template <int Dim>
+void check_distance(const ShapeEntry& entry, std::span<const SurfaceTriangle> triangles) {
+  constexpr double kFar = 0.05;  // of the diagonal
+  double farthest = 0;
+  for (const SurfaceTriangle& triangle : triangles)
+    for (Vec<3> corner : triangle) {
+      if (Dim == 2) corner[2] = 0;
+      farthest = std::max(farthest, std::abs(offset_from(entry.shape, corner).distance));
+    }
+  if (farthest > kFar * diagonal_of(triangles))
+    entry.node.fail(
+        fmt::format("a geometry that a vertex of its surface is {} off", entry.node.document().units.text(farthest, "m", 3)),
+        "one that all vertices of the surface lie on");
+}
+
 }  // namespace
 
 std::array<SurfaceTriangle, 2> raised(const Vec<2>& a, const Vec<2>& b) {
@@ -139,11 +163,12 @@ Shape shape_through(const ShapeEntry& entry, std::span<const SurfaceTriangle> tr
   constexpr double kTolerance = 1e-5;  // of the diagonal: meshes of CAD programs have fewer digits than doubles
   using enum Shape::Kind;
   const Shape& asked = entry.shape;
-  if (entry.has_numbers || (Dim == 2 && asked.kind == fitted)) return asked;
-  Eigen::AlignedBox<double, 3> box;
-  for (const SurfaceTriangle& triangle : triangles)
-    for (const Vec<3>& corner : triangle) box.extend(corner);
-  const double tolerance = kTolerance * box.diagonal().norm();
+  if (Dim == 2 && asked.kind == fitted) return asked;
+  if (entry.has_numbers) {
+    check_distance<Dim>(entry, triangles);
+    return asked;
+  }
+  const double tolerance = kTolerance * diagonal_of(triangles);
   const std::optional<ShapeFit> fit = asked.kind == fitted
                                           ? recognize_shape(triangles, tolerance)
                                           : fit_shape(Dim == 2 && asked.kind == sphere ? cylinder : asked.kind, triangles);
@@ -161,7 +186,7 @@ Shape shape_through(const ShapeEntry& entry, std::span<const SurfaceTriangle> tr
   if (Dim == 2) {
     shape.kind = asked.kind;
     shape.center[2] = 0;
-    shape.axis = Vec<3>(shape.axis[0], shape.axis[1], 0).normalized();
+    if (asked.kind == plane) shape.axis = Vec<3>(shape.axis[0], shape.axis[1], 0).normalized();
   }
   return shape;
 }

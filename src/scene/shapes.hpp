@@ -25,7 +25,7 @@ template <int Dim>
 std::vector<ShapeEntry> read_shapes(const Node& root, const Sets& sets, const std::set<int>& surfaces);
 
 /// The shape of an entry, where there are no numbers that through the corners of these triangles; in 2D those of edges, see
-/// `raised`. Throws InputError if there is none.
+/// `raised`. Throws InputError if there is none, and where a corner is far off the numbers that there are.
 template <int Dim>
 Shape shape_through(const ShapeEntry& entry, std::span<const SurfaceTriangle> triangles);
 

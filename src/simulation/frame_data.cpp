@@ -105,14 +105,14 @@ struct FrameCells {
   CellSet<Dim> cells;
   PatchPressures<Dim> pressures;
   std::vector<double> densities;
-  std::shared_ptr<const ViscousField<Dim>> viscous;      ///< null: no body is viscoelastic
-  std::shared_ptr<const SofteningField<Dim>> softening;  ///< null: no body softens
+  std::shared_ptr<const CellField<Dim>> viscous;    ///< null: no body is viscoelastic
+  std::shared_ptr<const CellField<Dim>> softening;  ///< null: no body softens
 
   FrameCells(const Setup<Dim>& setup, const State<Dim>& state, const VectorX& x)
       : materials(materials_at(setup, state.t)),
         cells(whole_mesh(state.mesh, {})),
-        viscous(std::dynamic_pointer_cast<const ViscousField<Dim>>(state.history.viscous)),
-        softening(std::dynamic_pointer_cast<const SofteningField<Dim>>(state.history.softening)) {
+        viscous(std::dynamic_pointer_cast<const CellField<Dim>>(state.history.viscous)),
+        softening(std::dynamic_pointer_cast<const CellField<Dim>>(state.history.softening)) {
     add_patches(materials, cells);
     if (!cells.patches) return;
     const auto rule_of = [&](std::size_t e) -> const auto& {

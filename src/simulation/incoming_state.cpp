@@ -117,10 +117,10 @@ void check_history(const Setup<Dim>& setup, const State<Dim>& state) {
 }
 
 /// Refuses records of cells that are not as many as their material has.
-template <int Dim, typename Field, typename F>
+template <int Dim, typename F>
 void check_cells(const Setup<Dim>& setup, const State<Dim>& state, const std::shared_ptr<const CellHistory>& saved,
                  const char* name, const F& rows_of) {
-  const auto field = std::dynamic_pointer_cast<const Field>(saved);
+  const auto field = std::dynamic_pointer_cast<const CellField<Dim>>(saved);
   for (CellId c = 0; c < state.mesh.cell_slots(); ++c) {
     const Eigen::Index rows = rows_of(setup.materials.at(state.mesh.body(c)));
     const Eigen::Index found = field ? field->by_cell().at(static_cast<std::size_t>(c)).rows() : 0;
@@ -244,12 +244,9 @@ void refuse_misfit(const Setup<Dim>& setup, const State<Dim>& state) {
     require_size("saved levels of quadrature", state.quadrature.size(), whole_mesh(mesh, {}).curved().size());
   if (!state.chords.empty())
     require_size("saved levels of chords", state.chords.size(), static_cast<std::size_t>(mesh.num_curved()));
-  using Viscous = ViscousField<Dim>;
-  check_cells<Dim, Viscous>(setup, state, state.history.viscous, "saved terms of viscoelasticity", [](const Material& of) {
-    return of.prony.empty() ? 0 : Viscous::kOfLaw + Viscous::kOfTerm * static_cast<Eigen::Index>(of.prony.size());
-  });
-  check_cells<Dim, SofteningField<Dim>>(setup, state, state.history.softening, "saved softening",
-                                        [](const Material& of) -> Eigen::Index { return of.mullins ? 1 : 0; });
+  check_cells(setup, state, state.history.viscous, "saved terms of viscoelasticity", ViscousRecord::size);
+  check_cells(setup, state, state.history.softening, "saved softening",
+              [](const Material& of) -> Eigen::Index { return of.mullins ? 1 : 0; });
   if (state.step < 0) refuse_state("saved step", std::to_string(state.step), "0 or more");
   for (const auto& [name, value] : {std::pair("time", state.t), std::pair("created energy", state.created_energy),
                                     std::pair("barrier stiffness", state.stiffness.value)})

@@ -473,10 +473,8 @@ std::set<int> tied_or_coupled(const Setup<Dim>& setup) {
   return tags;
 }
 
-/// Vertices that the mesh begins with are moved onto their shape, but not far: as far as one is that refines a polygon.
 template <int Dim>
 void check_shapes(const Setup<Dim>& setup) {
-  constexpr double kFar = 0.05;  // of the surface's diagonal
   const Mesh<Dim>& mesh = setup.mesh;
   const std::set<int> kept = tied_or_coupled(setup);
   for (std::size_t i = 0; i < setup.shapes.size(); ++i) {
@@ -489,22 +487,6 @@ void check_shapes(const Setup<Dim>& setup) {
       if (std::ranges::find(shape.surfaces, mesh.facet_tag(f)) != shape.surfaces.end() &&
           rigid_body_of(setup.materials.at(mesh.body(cell_of_facet(mesh, f)))))
         refuse(fmt::format("/shapes/{}/surface", i), "a surface of a rigid body", "one of a body that is remeshed");
-    if (shape.kind == Shape::Kind::fitted) continue;
-    Eigen::AlignedBox<double, Dim> box;
-    double farthest = 0;
-    for (const FacetId f : mesh.live_facets()) {
-      if (std::ranges::find(shape.surfaces, mesh.facet_tag(f)) == shape.surfaces.end()) continue;
-      for (const VertexId v : mesh.facet(f)) {
-        Vec<3> point = Vec<3>::Zero();
-        point.head<Dim>() = mesh.rest(v);
-        farthest = std::max(farthest, std::abs(offset_from(shape, point).distance));
-        box.extend(mesh.rest(v));
-      }
-    }
-    if (farthest > kFar * box.diagonal().norm())
-      refuse(fmt::format("/shapes/{}", i),
-             fmt::format("a geometry that a vertex of its surface is {} off", setup.units.text(farthest, "m", 3)),
-             "one that all vertices of the surface lie on");
   }
 }
 

@@ -4,10 +4,9 @@
 
 #include <vector>
 
+#include "energy/cell_field.hpp"
 #include "energy/contact/stiffness.hpp"
 #include "energy/elastic/elastic.hpp"
-#include "energy/softening.hpp"
-#include "energy/viscous.hpp"
 #include "fem/chord_levels.hpp"
 #include "itr/simulation.hpp"
 #include "linear/reuse.hpp"

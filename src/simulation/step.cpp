@@ -24,6 +24,7 @@
 #include "simulation/energy_guard.hpp"
 #include "simulation/fluid_front.hpp"
 #include "simulation/invariants.hpp"
+#include "simulation/past_step.hpp"
 #include "simulation/remesh_step.hpp"
 #include "simulation/shape_step.hpp"
 #include "simulation/stability.hpp"
@@ -145,7 +146,7 @@ class StepSolver {
       start->history.damp_next = before_.history.damp_next;
       if (!renumbering_.empty()) start->deviation.resize(0);  // of another mesh
     }
-    end_pasts(start);
+    end_pasts<Dim>(setup_, x_, before_.t, next_, renumbering_.empty() ? nullptr : start, report_);
     if (setup_.contact.enabled) tell_of_closed_faces();
     if (setup_.time.has_inertia()) next_.deviation = x_ - TimeIntegrator(setup_.time).predictor(next_.history);
     const VectorX increment = problem_->increment_of(x_);
@@ -353,25 +354,6 @@ class StepSolver {
     } else {
       next_.chords.clear();
     }
-  }
-
-  /// Lets viscoelastic bodies relax over the step, and its largest densities soften others; `start`, unless null, gets the
-  /// states before it on its mesh.
-  void end_pasts(State<Dim>* start) {
-    const auto viscous_at = [&](double t) { return viscous_step(setup_, next_.history, t); };
-    const auto softening_at = [&](double) { return softening_step(setup_, next_.history); };
-    if (next_.history.viscous) end_past(&History::viscous, viscous_at, report_.viscous_dissipation, start);
-    if (next_.history.softening) end_past(&History::softening, softening_at, report_.softening, start);
-  }
-  template <typename Past>
-  void end_past(std::shared_ptr<const CellHistory> History::*past, const Past& step_at, double& dissipation,
-                State<Dim>* start) {
-    if (start && !renumbering_.empty())
-      start->history.*past = step_at(before_.t)->end(next_.mesh, next_.history.x[0], before_.t).state;
-    auto end = step_at(next_.t)->end(next_.mesh, x_, next_.t);
-    next_.history.*past = std::move(end.state);
-    dissipation = end.dissipation;
-    report_.history_loss += end.loss;
   }
 
   /// Warns where faces that are no contact begin to be pressed into each other.

@@ -9,9 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "energy/softening.hpp"
 #include "energy/support.hpp"
-#include "energy/viscous.hpp"
 #include "itr/core.hpp"
 #include "mesh/rest_box.hpp"
 
@@ -150,7 +148,7 @@ std::map<int, Material> materials_at(const StepSetup<Dim>& setup, double t) {
 
 template <int Dim>
 std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup, const History& history, double t) {
-  const auto start = std::dynamic_pointer_cast<const ViscousField<Dim>>(history.viscous);
+  const auto start = std::dynamic_pointer_cast<const CellField<Dim>>(history.viscous);
   if (!start) return nullptr;
   const double dt = setup.time.is_static ? std::numeric_limits<double>::infinity() : t - start->time();
   return std::make_shared<ViscousStep<Dim>>(start, materials_at(setup, t), dt);
@@ -158,7 +156,7 @@ std::shared_ptr<const ViscousStep<Dim>> viscous_step(const StepSetup<Dim>& setup
 
 template <int Dim>
 std::shared_ptr<const SofteningStep<Dim>> softening_step(const StepSetup<Dim>& setup, const History& history) {
-  const auto start = std::dynamic_pointer_cast<const SofteningField<Dim>>(history.softening);
+  const auto start = std::dynamic_pointer_cast<const CellField<Dim>>(history.softening);
   return start ? std::make_shared<SofteningStep<Dim>>(start, setup.materials) : nullptr;
 }
 

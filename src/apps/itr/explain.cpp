@@ -40,26 +40,28 @@ void term(const char* name, bool is_in, const std::string& reason) {
   fmt::print("  {:10} {:3}  {}\n", name, is_in ? "yes" : "no", reason);
 }
 
-/// The components of a place, or without units of a unit vector, of which round-off is 0.
-std::string place_text(const Vec<3>& place, int dim, const Units* units) {
+/// The components of a unit vector, of which round-off is 0.
+template <int Dim>
+std::string direction_text(const Vec<3>& direction) {
   constexpr double kRoundOff = 1e-12;
-  std::vector<std::string> numbers;
-  for (int c = 0; c < dim; ++c) {
-    const double component = units ? units->from_si(place[c], "m") : std::abs(place[c]) < kRoundOff ? 0 : place[c];
-    numbers.push_back(fmt::format("{:.7g}", component));
-  }
-  return fmt::format("({})", fmt::join(numbers, ", "));
+  std::vector<std::string> components;
+  for (int c = 0; c < Dim; ++c)
+    components.push_back(fmt::format("{:.7g}", std::abs(direction[c]) < kRoundOff ? 0 : direction[c]));
+  return fmt::format("({})", fmt::join(components, ", "));
 }
 
-std::string describe(const Shape& shape, int dim, const Units& units) {
-  const std::string center = place_text(shape.center, dim, &units), axis = place_text(shape.axis, dim, nullptr);
-  const auto length = [&](double value) { return units.text(value, "m", 7); };
+template <int Dim>
+std::string describe(const Shape& shape, const Units& units) {
+  constexpr int kDigits = 7;
+  const std::string center = point_text<Dim>(shape.center.head<Dim>(), units, kDigits);
+  const std::string axis = direction_text<Dim>(shape.axis);
+  const auto length = [&](double value) { return units.text(value, "m", kDigits); };
   using enum Shape::Kind;
   switch (shape.kind) {
     case plane:
-      return fmt::format("{} through {}, normal {}", dim == 2 ? "line" : "plane", center, axis);
+      return fmt::format("{} through {}, normal {}", Dim == 2 ? "line" : "plane", center, axis);
     case sphere:
-      return fmt::format("{} of radius {} around {}", dim == 2 ? "circle" : "sphere", length(shape.radius), center);
+      return fmt::format("{} of radius {} around {}", Dim == 2 ? "circle" : "sphere", length(shape.radius), center);
     case cylinder:
       return fmt::format("cylinder of radius {} around the axis {} through {}", length(shape.radius), axis, center);
     case cone:
@@ -311,7 +313,7 @@ class Explanation {
   void shapes() const {
     if (!setup_.shapes.empty()) fmt::print("shapes\n");
     for (const auto& shape : setup_.shapes)
-      fmt::print("  surface {}: {}\n", fmt::join(shape->surfaces, ", "), describe(*shape, Dim, setup_.units));
+      fmt::print("  surface {}: {}\n", fmt::join(shape->surfaces, ", "), describe<Dim>(*shape, setup_.units));
   }
 
   linear::Registry& registry_;

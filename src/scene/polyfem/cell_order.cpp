@@ -8,6 +8,7 @@
 #include <queue>
 
 #include "core/check.hpp"
+#include "core/sorted.hpp"
 
 namespace itr::scene {
 
@@ -15,12 +16,6 @@ namespace {
 
 using Cell = Mesh<3>::Cell;
 using Triangle = std::array<int, 3>;
-
-template <typename Simplex>
-Simplex sorted(Simplex simplex) {
-  std::sort(simplex.begin(), simplex.end());
-  return simplex;
-}
 
 /// PolyFEM's mesh: a cell's corners are sorted, and its last corner is the one that its first facet does not have. Which
 /// corner that is after a refinement depends on how facets list their corners before it.
