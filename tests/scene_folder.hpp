@@ -2,10 +2,8 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <variant>
@@ -22,48 +20,19 @@ using nlohmann::json;
 /// A folder with a unit square of two triangles, a line and a tetrahedron, and scenes written into it.
 class SceneTest : public ::testing::Test {
  protected:
-  SceneTest() : folder_(fs::path(::testing::TempDir()) / ("itr_scene_" + std::to_string(::getpid()))) {
-    fs::create_directories(folder_ / "sub");
-    write("square.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 4 3\n");
-    write("line.obj", "v -1 0 0\nv 1 0 0\nl 1 2\n");
-    write("tet.msh",
-          "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
-          "$Elements\n1\n1 4 2 3 1 1 2 3 4\n$EndElements\n");
-    write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
-  }
-  ~SceneTest() override { fs::remove_all(folder_); }
+  SceneTest();
+  ~SceneTest() override;
 
-  void write(const std::string& name, const std::string& text) { std::ofstream(folder_ / name, std::ios::binary) << text; }
+  void write(const std::string& name, const std::string& text);
 
   /// The least scene with the readers' own defaults, PolyFEM's, and `changes` merged into it.
-  static json square(const json& changes = json::object()) {
-    json scene = {{"defaults", "polyfem"},
-                  {"geometry", json::array({{{"mesh", "square.obj"}, {"volume_selection", 1}}})},
-                  {"materials", json::array({{{"id", 1}, {"type", "NeoHookean"}, {"E", 1e4}, {"nu", 0.4}, {"rho", 1000}}})},
-                  {"time", {{"dt", 0.1}, {"tend", 1}}}};
-    scene.merge_patch(changes);
-    return scene;
-  }
+  static json square(const json& changes = json::object());
 
-  Scene read_scene(const json& scene, const std::vector<Override>& overrides = {}) {
-    write("scene.json", scene.dump());
-    return read(folder_ / "scene.json", overrides);
-  }
-  itr::Setup<2> read2(const json& scene, const std::vector<Override>& overrides = {}) {
-    return std::get<itr::Setup<2>>(read_scene(scene, overrides).setup);
-  }
-
-  InputError::Parts failure(const json& scene, const std::vector<Override>& overrides = {}) {
-    try {
-      read_scene(scene, overrides);
-    } catch (const InputError& error) {
-      return error.parts();
-    }
-    ADD_FAILURE() << "read without an error: " << scene;
-    return {};
-  }
+  Scene read_scene(const json& scene, const std::vector<Override>& overrides = {});
+  itr::Setup<2> read2(const json& scene, const std::vector<Override>& overrides = {});
+  InputError::Parts failure(const json& scene, const std::vector<Override>& overrides = {});
   /// Where a scene with these changes is wrong.
-  std::string wrong_place(const json& changes) { return failure(square(changes)).place; }
+  std::string wrong_place(const json& changes);
 
   fs::path folder_;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "energy/cone_sum.hpp"
 
+#include <numbers>
+
 #include "geometry/cofactors.hpp"
 #include "geometry/measures.hpp"
 #include "project_block.hpp"
@@ -35,6 +37,31 @@ Mat<9> cone_hessian(const Mat<3>& p) {
 
 Mat<2> cone_gradient(const Mat<2>& p) { return cofactors(p) / 2; }
 Mat<3> cone_gradient(const Mat<3>& p) { return cofactors(p) / 6; }
+
+TurnedPoint::TurnedPoint(CurvedEdges curved, const std::array<double, 2>& l, const Nodal& x)
+    : shapes(quadratic_shapes<1>(curved, l)),
+      slopes(quadratic_gradients<1, 1>(curved, l, Eigen::RowVector2d(-1, 1)).transpose()),
+      r(x.row(0) * shapes),
+      dr(x.row(0) * slopes),
+      dz(x.row(1) * slopes) {}
+
+double TurnedPoint::volume() const { return std::numbers::pi * r * r * dz; }
+TurnedPoint::Nodal TurnedPoint::gradient() const {
+  Nodal g;
+  g.row(0) = 2 * std::numbers::pi * r * dz * shapes.transpose();
+  g.row(1) = std::numbers::pi * r * r * slopes.transpose();
+  return g;
+}
+TurnedPoint::Nodal TurnedPoint::normal() const { return 2 * std::numbers::pi * r * Vec<2>(dz, -dr) * shapes.transpose(); }
+Mat<2 * kQuadraticNodes<1>> TurnedPoint::hessian() const {
+  Mat<2 * kQuadraticNodes<1>> H = Mat<2 * kQuadraticNodes<1>>::Zero();
+  for (int a = 0; a < kQuadraticNodes<1>; ++a)
+    for (int b = 0; b < kQuadraticNodes<1>; ++b) {
+      H(2 * a, 2 * b) = 2 * std::numbers::pi * dz * shapes[a] * shapes[b];
+      H(2 * a, 2 * b + 1) = H(2 * b + 1, 2 * a) = 2 * std::numbers::pi * r * shapes[a] * slopes[b];
+    }
+  return H;
+}
 
 template <int Dim>
 CornerWeights<Dim> corner_weights(CurvedEdges curved, const std::array<double, Dim>& l) {

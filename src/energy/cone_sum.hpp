@@ -3,7 +3,6 @@
 // that is turned about the axis has pi times the integral of r^2 dz over it instead.
 #pragma once
 
-#include <numbers>
 #include <vector>
 
 #include "energy/energy.hpp"
@@ -29,31 +28,12 @@ struct TurnedPoint {
   Vec<kQuadraticNodes<1>> shapes, slopes;
   double r, dr, dz;  ///< radius, and derivatives of the position along the edge
 
-  TurnedPoint(CurvedEdges curved, const std::array<double, 2>& l, const Nodal& x)
-      : shapes(quadratic_shapes<1>(curved, l)),
-        slopes(quadratic_gradients<1, 1>(curved, l, Eigen::RowVector2d(-1, 1)).transpose()),
-        r(x.row(0) * shapes),
-        dr(x.row(0) * slopes),
-        dz(x.row(1) * slopes) {}
-
-  double volume() const { return std::numbers::pi * r * r * dz; }
-  Nodal gradient() const {
-    Nodal g;
-    g.row(0) = 2 * std::numbers::pi * r * dz * shapes.transpose();
-    g.row(1) = std::numbers::pi * r * r * slopes.transpose();
-    return g;
-  }
+  TurnedPoint(CurvedEdges curved, const std::array<double, 2>& l, const Nodal& x);
+  double volume() const;
+  Nodal gradient() const;
   /// Area times normal, shared by shape functions.
-  Nodal normal() const { return 2 * std::numbers::pi * r * Vec<2>(dz, -dr) * shapes.transpose(); }
-  Mat<2 * kQuadraticNodes<1>> hessian() const {
-    Mat<2 * kQuadraticNodes<1>> H = Mat<2 * kQuadraticNodes<1>>::Zero();
-    for (int a = 0; a < kQuadraticNodes<1>; ++a)
-      for (int b = 0; b < kQuadraticNodes<1>; ++b) {
-        H(2 * a, 2 * b) = 2 * std::numbers::pi * dz * shapes[a] * shapes[b];
-        H(2 * a, 2 * b + 1) = H(2 * b + 1, 2 * a) = 2 * std::numbers::pi * r * shapes[a] * slopes[b];
-      }
-    return H;
-  }
+  Nodal normal() const;
+  Mat<2 * kQuadraticNodes<1>> hessian() const;
 };
 
 /// Adds the columns to the entries of a facet's nodes; at a straight edge the last column is zero.

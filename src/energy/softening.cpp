@@ -164,6 +164,7 @@ std::pair<Mat<3>, double> softening_of_state(const typename CellField<Dim>::Reco
 
 #define ITR_INSTANTIATE(Dim)                                                                                         \
   template class SofteningStep<Dim>;                                                                                 \
+  template class PastEnergy<Dim, SofteningPoint>;                                                                    \
   template SofteningPoint softening_point<Dim>(const Material&, const Vec<Dim>&, const std::array<double, Dim + 1>&, \
                                                const typename CellField<Dim>::Records&);                             \
   template std::shared_ptr<const CellHistory> begin_softening(const Mesh<Dim>&, const std::map<int, Material>&,      \

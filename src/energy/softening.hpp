@@ -84,6 +84,8 @@ class SofteningStep {
 /// Compares W with its largest value at the points of kStateDegree.
 template <int Dim>
 using SofteningEnergy = PastEnergy<Dim, SofteningPoint>;
+extern template class PastEnergy<2, SofteningPoint>;
+extern template class PastEnergy<3, SofteningPoint>;
 
 /// Cauchy stress in space [Pa] and energy density that softening adds to those of the law of a body that has come to F, at
 /// the point X with barycentric coordinates `weights` of a cell with these records.

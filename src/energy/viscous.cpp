@@ -319,6 +319,7 @@ std::pair<Mat<3>, double> past_of_state(const typename CellField<Dim>::Records& 
 
 #define ITR_INSTANTIATE(Dim)                                                                                                \
   template class ViscousStep<Dim>;                                                                                          \
+  template class PastEnergy<Dim, ViscousPoint>;                                                                             \
                                                                                                                             \
   template std::shared_ptr<const CellHistory> begin_viscous(const Mesh<Dim>&, const std::map<int, Material>&,               \
                                                             ConstVectorView, double, bool);                                 \

@@ -97,6 +97,8 @@ class ViscousStep {
 
 template <int Dim>
 using ViscousEnergy = PastEnergy<Dim, ViscousPoint>;
+extern template class PastEnergy<2, ViscousPoint>;
+extern template class PastEnergy<3, ViscousPoint>;
 
 /// Cauchy stress in space [Pa] and energy density that the past of a body adds to those of its instantaneous law, at the
 /// rest position X, a point with barycentric coordinates `weights` of a cell with these records.

@@ -58,7 +58,7 @@ def write_ball(file, rings=12, sectors=24):
         out.writelines("f {} {} {}\n".format(*(v + 1 for v in face)) for face in faces)
 
 
-def scene(work):
+def scene(work, steps):
     return {
         "geometry": [{"mesh": str(work / "plate.msh"), "volume_selection": 1,
                       "transformation": {"translation": [0, 0, RADIUS + GAP]}},
@@ -66,7 +66,7 @@ def scene(work):
         "materials": {"type": "NeoHookean", "E": 1e6, "nu": 0.45, "rho": 1000},
         "boundary_conditions": {"rhs": [0, 0, 9.81]},
         "initial_conditions": {"velocity": [{"id": 1, "value": [0, 0, -SPEED]}]},
-        "time": {"dt": STEP, "time_steps": 20},
+        "time": {"dt": STEP, "time_steps": steps},
         "contact": {"enabled": True, "dhat": 1e-3, "use_convergent_formulation": True},
         "solver": {"nonlinear": {"solver": "Newton", "x_delta": 1e-4, "grad_norm": 1e-8},
                    "contact": {"barrier_stiffness": 1e6}},
@@ -74,55 +74,70 @@ def scene(work):
     }
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def add_arguments(parser):
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build" / "release")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "results" / "million")
     parser.add_argument("--cells", type=int, default=410, help="along an edge of the plate")
+    parser.add_argument("--steps", type=int, default=20)
     parser.add_argument("--solver", default="auto")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--resume", action="store_true", help="go on with the run that is in the work folder")
-    parser.add_argument("--store", action="store_true", help="add the row to million.csv")
-    arguments = parser.parse_args()
+
+
+def run(arguments):
+    """A row of KEYS without a commit, or None where the run ended badly."""
     work = arguments.work.resolve()
     work.mkdir(parents=True, exist_ok=True)
     if not arguments.resume:
         write_plate(work / "plate.msh", arguments.cells)
         write_ball(work / "ball.obj")
-        (work / "scene.json").write_text(json.dumps(scene(work), indent=1), encoding="utf-8")
+        (work / "scene.json").write_text(json.dumps(scene(work, arguments.steps), indent=1), encoding="utf-8")
     itr, folder = arguments.build / "bin" / "itr", work / "run"
     command = [itr, "run", work / "scene.json", "-o", folder, "--resume" if arguments.resume else "--overwrite", "--threads",
                arguments.threads, "--solver", arguments.solver, "--defaults", "polyfem"]
     with open(work / "log", "w+", encoding="utf-8") as log:
         status = subprocess.run(list(map(str, command)), stdout=log, stderr=log, check=False).returncode
         log.seek(0)
-        taken = re.findall(r"auto takes (\S+)", log.read())
+        taken = re.findall(r"auto takes (\S+) for", log.read())
     if status != 0:
         print(f"ended with status {status}, see {work / 'log'}")
-        return 1
+        return None
     lines = [json.loads(line) for line in open(folder / "steps.jsonl", encoding="utf-8")]
     steps = lines[1:]
     total = lambda key: sum(step[key] for step in steps)
-    seconds = lambda key: round(sum(step["seconds"][key] for step in steps), 1)
-    row = {"cells": arguments.cells, "solver": arguments.solver, "taken": taken[-1] if taken else arguments.solver,
-           "threads": arguments.threads, "unknowns": steps[-1]["unknowns"], "vertices": steps[-1]["vertices"],
-           "tetrahedra": steps[-1]["elements"], "steps": len(steps), "newton_iterations": total("newton_iterations"),
-           "linear_solves": total("linear_solves"), "factorizations": total("factorizations"),
-           "linear_iterations": total("linear_iterations"), "steps_in_contact": sum(step["energy"]["contact"] > 0 for step in steps),
-           "seconds": seconds("total"), "linear_s": seconds("linear_solve"), "assembly_s": seconds("assembly"),
-           "line_search_s": seconds("line_search"), "ccd_s": seconds("ccd"), "processor_s": round(total("processor_seconds"), 1),
-           "peak_mb": round(max(step["peak_rss_mb"] for step in steps)),
-           "certified": subprocess.run([str(itr), "certify", str(folder)], stdout=subprocess.DEVNULL, check=False).returncode == 0,
-           "commit": stored.made("verification/scaling/million.csv")}
+    seconds = lambda key: round(sum(step["seconds"][key] for step in steps), 3)
+    return {"cells": arguments.cells, "solver": arguments.solver, "taken": taken[-1] if taken else arguments.solver,
+            "threads": arguments.threads, "unknowns": steps[-1]["unknowns"], "vertices": steps[-1]["vertices"],
+            "tetrahedra": steps[-1]["elements"], "steps": len(steps), "newton_iterations": total("newton_iterations"),
+            "linear_solves": total("linear_solves"), "factorizations": total("factorizations"),
+            "linear_iterations": total("linear_iterations"), "steps_in_contact": sum(step["energy"]["contact"] > 0 for step in steps),
+            "seconds": seconds("total"), "linear_s": seconds("linear_solve"), "assembly_s": seconds("assembly"),
+            "line_search_s": seconds("line_search"), "ccd_s": seconds("ccd"), "processor_s": round(total("processor_seconds"), 3),
+            "peak_mb": round(max(step["peak_rss_mb"] for step in steps)),
+            "certified": subprocess.run([str(itr), "certify", str(folder)], stdout=subprocess.DEVNULL, check=False).returncode == 0}
+
+
+def store(file, row):
+    row = {**row, "commit": stored.made(f"verification/scaling/{file.name}")}
+    is_new = not file.exists()
+    with open(file, "a", newline="", encoding="utf-8") as out:
+        writer = csv.DictWriter(out, KEYS)
+        if is_new:
+            writer.writeheader()
+        writer.writerow(row)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_arguments(parser)
+    parser.add_argument("--store", action="store_true", help="add the row to million.csv")
+    arguments = parser.parse_args()
+    row = run(arguments)
+    if row is None:
+        return 1
     print(json.dumps(row, indent=1))
     if arguments.store:
-        file = HERE / "million.csv"
-        is_new = not file.exists()
-        with open(file, "a", newline="", encoding="utf-8") as out:
-            writer = csv.DictWriter(out, KEYS)
-            if is_new:
-                writer.writeheader()
-            writer.writerow(row)
+        store(HERE / "million.csv", row)
     return 0
 
 
