@@ -397,6 +397,23 @@ class Reports(Case):
         self.assertIn("which are rigid and are not free to part", words)
         self.assertNotIn("line search", words)
 
+    def test_numbers_in_degrees_and_of_other_units_are_asked_about(self):
+        def words(rhs=(0, 9.81), **changes):
+            material = {"type": "NeoHookean", "E": 1e7, "nu": 0.3, "rho": 1000, **changes.pop("material", {})}
+            return self.call("explain", self.write({"geometry": self.block(), "materials": material, "time": {"dt": 1, "tend": 1},
+                                                    "boundary_conditions": {"rhs": list(rhs)}, **changes}))
+        degrees = words(rhs=["9.81 * sin(30)", "9.81 * cos(deg2rad(30))"])
+        self.assertIn("/boundary_conditions/rhs: sin(30) is of radians, of more than a full turn; deg2rad() takes degrees", degrees)
+        steel = {"E": 210000, "rho": 7850}
+        self.assertIn("E = 2.1e+05 Pa is unusual at a density of 7850 kg/m^3: are moduli in Pa?", words(material=steel))
+        tonnes = words(material={"rho": 1000}, units={"length": "mm", "mass": "t", "time": "s"},
+                       time={"dt": 1, "tend": 1, "quasistatic": True}, boundary_conditions={"dirichlet_boundary": [
+                           {"id": 2, "value": [0, 0]}]})
+        self.assertIn("rho = 1e+03 t/mm^3 is unusual", tonnes)
+        usual = words()
+        for part in ("is of radians", "is unusual"):
+            self.assertNotIn(part, usual)
+
     def test_explain_leaves_out_averaged_gaps_where_they_are_off(self):
         scene = self.soft(geometry=self.block(), contact={"enabled": True, "friction_coefficient": 0.2})
         self.assertIn("/contact/average_gaps", self.call("explain", self.write(scene)))

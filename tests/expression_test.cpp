@@ -48,6 +48,13 @@ TEST(Expression, Functions) {
   EXPECT_FALSE(Expression("0 * t").is_constant());
 }
 
+TEST(Expression, KnowsPlainAnglesOfMoreThanATurn) {
+  using Calls = std::vector<std::string>;
+  EXPECT_EQ(Expression("9.81 * sin(30) + cos -45").large_angles(), (Calls{"sin(30)", "cos -45"}));
+  for (const char* text : {"sin(6)", "sin(30 * t)", "sin(deg2rad(30))", "cosh(30)", "cos(30 + x)"})
+    EXPECT_TRUE(Expression(text).large_angles().empty()) << text;
+}
+
 TEST(Expression, KnowsItsKinksInTime) {
   const auto kinks = [](const std::string& text) { return Expression(text).kinks(0, 10); };
   EXPECT_EQ(kinks("3 * t + sin(t)"), std::vector<double>{});

@@ -66,6 +66,32 @@ TEST(NearIncompressible, CookHasTheErrorsOfCompressibleBodies) {
   }
 }
 
+/// Remeshed from 4 x 4 quadrilaterals on, by patches that edits carry.
+TEST(NearIncompressible, RemeshedCookDoesNotLock) {
+  const double exact = energy_of(cook(16, 2, 0.4999, VolumeForm::patches));
+  const auto run = [&](VolumeForm form) {
+    Setup<2> setup = cook(4, 1, 0.4999, form);
+    setup.time = {.quasistatic = true, .dt = 0.5, .steps = 2};
+    setup.remesh.enabled = true;
+    setup.remesh.relative_tolerance = 0.02;
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    StepReport report;
+    while (!simulation.finished()) {
+      report = advance(simulation).report;
+      EXPECT_LE(report.newton_iterations, 60);
+      EXPECT_GT(report.min_volume_ratio, 0);
+      EXPECT_EQ(report.reverted_remeshes, 0);
+    }
+    return std::pair(report.vertices, std::abs(1 - report.energy.total / exact));
+  };
+  const auto [vertices, error] = run(VolumeForm::patches);
+  const auto [others, locked] = run(VolumeForm::pointwise);
+  EXPECT_GT(vertices, 60);
+  EXPECT_LT(vertices, 1.2 * others);
+  EXPECT_LT(error, 0.5 * locked);
+}
+
 /// A square whose sides are held, turned by a force that is a curl: full orders, and errors of compressible bodies.
 TEST(NearIncompressible, SmoothSolutionsConvergeAtFullOrder) {
   const auto energy = [](int n, int order, double nu, VolumeForm volume) {
@@ -232,7 +258,16 @@ TEST(NearIncompressible, ProgramsAreRefusedWhatHasNoPatches) {
   auto setup = cook(2, 1, 0.4999, VolumeForm::patches);
   EXPECT_EQ(place(setup), "");
   setup.remesh.enabled = true;
+  EXPECT_EQ(place(setup), "");
+  setup.remesh.curve.enabled = true;
   EXPECT_EQ(place(setup), "/materials/*/volume");
+  setup.remesh.curve.enabled = false;
+  setup.remesh.screening = Screening::energy_percentile;
+  EXPECT_EQ(place(setup), "/materials/*/volume");
+  setup.remesh.screening = Screening::bounds;
+  setup.mesh.set_axisymmetric(true);
+  EXPECT_EQ(place(setup), "/materials/*/volume");
+  setup.mesh.set_axisymmetric(false);
   setup.remesh.enabled = false;
   setup.materials[1].law = MaterialLaw::linear;
   EXPECT_EQ(place(setup), "/materials/*/volume");
@@ -271,7 +306,17 @@ TEST_F(SceneTest, NearlyIncompressibleBodiesAverageTheirVolume) {
   EXPECT_EQ(form({{"type", "Yeoh"}, {"C", {1}}, {"K", 45}, {"rho", 1}}), kPointwise);
   EXPECT_EQ(form({{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 0.2}, {"k", 200}, {"rho", 1}}), kPatches);
   EXPECT_EQ(form(rubber(0.49), {{"defaults", "polyfem"}}), kPointwise);
-  EXPECT_EQ(form(rubber(0.49), {{"space", {{"remesh", {{"enabled", true}}}}}}), kPointwise);
+  const auto remeshed = [&](json remesh, int order = 1) {
+    remesh["enabled"] = true;
+    return form(rubber(0.49), {{"space", {{"remesh", remesh}, {"discr_order", order}}}});
+  };
+  EXPECT_EQ(remeshed(json::object()), kPatches);
+  EXPECT_EQ(remeshed(json::object(), 2), kPointwise);
+  EXPECT_EQ(remeshed({{"curve", {{"enabled", true}}}}), kPointwise);
+  EXPECT_EQ(remeshed({{"screening", "energy-percentile"}}), kPointwise);
+  EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}),
+                 {{"axisymmetric", true}, {"space", {{"remesh", {{"enabled", true}}}}}}),
+            kPointwise);
   EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}), {{"axisymmetric", true}}), kPatches);
   for (const auto& [order, expected] : {std::pair{1, kPatches}, {2, kPointwise}}) {  // of tetrahedra
     json scene = square({{"materials", rubber(0.49, {{"plane_strain", nullptr}})}, {"space", {{"discr_order", order}}}});

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "expression.hpp"
 #include "key_table.hpp"
 #include "readers.hpp"
 
@@ -96,9 +97,23 @@ class Checker {
     for (const Node& item : node.items()) check(item, pattern + "/*");
   }
 
-  static void check_value(const Node& node, const Entry& entry) {
+  void check_value(const Node& node, const Entry& entry) {
+    warn_of_degrees(node, node.json());
     if (entry.kind.check) return entry.kind.check(node);
     if (!entry.kind.choices.empty()) node.choice(entry.kind.choices, 0);
+  }
+
+  void warn_of_degrees(const Node& node, const nlohmann::json& value) {
+    if (value.is_array())
+      for (const auto& item : value) warn_of_degrees(node, item);
+    if (!value.is_string()) return;
+    try {
+      const Expression expression(value.get<std::string>());
+      for (const std::string& call : expression.large_angles())
+        warnings_.push_back(node.pointer() + ": " + call +
+                            " is of radians, of more than a full turn; deg2rad() takes degrees");
+    } catch (const ExpressionError&) {  // who reads it says so
+    }
   }
 
   void check_unread(const Node& node, const Entry& entry) {

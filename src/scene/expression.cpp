@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <span>
 
 #include "core/quoted.hpp"
 
@@ -224,6 +225,7 @@ class ExpressionParser {
 
   void function(int index) {
     const int arity = kFunctions[index].arity;
+    const std::size_t begin = position_ - kFunctions[index].name.size(), first = out_.program_.size();
     if (arity == 0) {
       if (take('(')) expect(')');
     } else if (arity == 1 && next() != '(') {
@@ -231,7 +233,18 @@ class ExpressionParser {
     } else {
       arguments(kFunctions[index]);
     }
+    find_large_angle(kFunctions[index].name, begin, first);
     emit({Code::call, static_cast<unsigned char>(arity), index}, 1 - arity);
+  }
+
+  /// Notes a call, from `begin` in the text to here, whose argument, from the instruction `first` on, is a plain number.
+  void find_large_angle(std::string_view name, std::size_t begin, std::size_t first) {
+    const std::span argument(out_.program_.begin() + static_cast<std::ptrdiff_t>(first), out_.program_.end());
+    const bool is_angle = name == "sin" || name == "cos" || name == "tan";
+    const bool is_plain = !argument.empty() && argument[0].code == Code::number &&
+                          (argument.size() == 1 || (argument.size() == 2 && argument[1].code == Code::negate));
+    if (is_angle && is_plain && std::abs(argument[0].number) > 2 * std::numbers::pi)
+      out_.large_angles_.emplace_back(text_.substr(begin, position_ - begin));
   }
 
   void arguments(const Function& function) {

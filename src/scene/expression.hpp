@@ -29,6 +29,8 @@ class Expression {
   bool is_constant() const { return !uses_space_ && !uses_time_; }
   bool uses_time() const { return uses_time_; }
   bool uses_space() const { return uses_space_; }
+  /// Calls of sin, cos and tan of a plain number above a full turn, which may be meant as degrees.
+  const std::vector<std::string>& large_angles() const { return large_angles_; }
   /// Times between these two at which it, or a derivative up to the second, may jump: where a condition, a sign or a whole
   /// number that depends on t alone changes. Of two changes within a thousandth of the way the first may be missed.
   std::vector<double> kinks(double begin, double end) const;
@@ -48,6 +50,7 @@ class Expression {
   std::vector<double> pieces_at(double t) const;
 
   std::vector<Instruction> program_;
+  std::vector<std::string> large_angles_;
   int depth_ = 0;  ///< most numbers on the stack at a time
   bool uses_space_ = false, uses_time_ = false;
 };

@@ -317,6 +317,15 @@ LawSum read_law_sum(const Node& node, int dimension) {
   return read_sum_of_laws(node, law, dimension, dimension, requirements);
 }
 
+/// Whether remeshing, if there is any, carries patches: on linear elements, and where energies of trials decide.
+static bool can_carry_patches(const Node& root) {
+  const Node space = root["space"], remesh = space["remesh"];
+  if (!remesh["enabled"].boolean(false)) return true;
+  return (!space["discr_order"].exists() || space["discr_order"].json() == 1) && !is_axisymmetric(root) &&
+         !remesh["curve"]["enabled"].boolean(false) && !remesh["sizing_field"]["enabled"].boolean(false) &&
+         !(remesh["screening"].exists() && remesh["screening"].json() == "energy-percentile");
+}
+
 template <int Dim>
 std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies, const Mesh<Dim>& mesh,
                                        std::vector<std::string>& warnings) {
@@ -336,7 +345,7 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   // Quadratic tetrahedra do without: their patches have 65 nodes, which takes several times as long at equal error.
   const Node order = root["space"]["discr_order"];
   const bool is_cheap = Dim == 2 || !order.exists() || order.json() == 1;
-  const bool has_patches = averages_volume(root) && is_cheap && !root["space"]["remesh"]["enabled"].boolean(false);
+  const bool has_patches = averages_volume(root) && is_cheap && can_carry_patches(root);
   const int space = is_axisymmetric(root) ? 3 : Dim;
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id

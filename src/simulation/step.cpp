@@ -16,6 +16,7 @@
 #include "core/check.hpp"
 #include "core/profile.hpp"
 #include "core/timer.hpp"
+#include "remesh/carried_patches.hpp"
 #include "simulation/accuracy_guard.hpp"
 #include "simulation/chord_bound.hpp"
 #include "simulation/closed_faces.hpp"
@@ -450,8 +451,8 @@ class StepSolver {
   /// Whether edges become curved where straight ones keep up what would buckle.
   bool may_curve_for_stability() const {
     return !setup_.time.has_inertia() && setup_.remesh.curve.for_stability && !setup_.remesh.sizing_field.enabled &&
-           !setup_.lump_mass && setup_.terms.empty() && !setup_.follower.forces &&
-           setup_.newton.indefinite == IndefiniteHessian::project;
+           !(setup_.remesh.enabled && any_averages_volume(setup_.materials)) && !setup_.lump_mass && setup_.terms.empty() &&
+           !setup_.follower.forces && setup_.newton.indefinite == IndefiniteHessian::project;
   }
 
   /// Curves edges and solves again as long as the solution is stable only because edges are straight. The last solve, if it

@@ -134,8 +134,18 @@ constexpr Check<Dim> kChecks[] = {
      [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && setup.contact.has_adhesion(); }},
     {{"/contact/adhesion", "adhesion in an axisymmetric scene: its pull on a pair is not by the area around the axis"},
      [](const Setup<Dim>& setup, bool) { return setup.mesh.is_axisymmetric() && setup.contact.has_adhesion(); }},
-    {{"/materials/*/volume", "\"patches\" where the mesh changes: a gain by fewer patches would not be one of the mesh"},
-     [](const Setup<Dim>& setup, bool) { return setup.remesh.enabled && has_patches(setup); }},
+    {{"/materials/*/volume",
+      "\"patches\" of quadratic elements where the mesh changes: edits carry constants in cells only"},
+     [](const Setup<Dim>& setup, bool curves) { return setup.remesh.enabled && curves && has_patches(setup); }},
+    {{"/materials/*/volume", "\"patches\" where the mesh of axisymmetric bodies changes"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && setup.mesh.is_axisymmetric() && has_patches(setup);
+     }},
+    {{"/materials/*/volume", "\"patches\" where a sizing field or energies in cells choose the edits"},
+     [](const Setup<Dim>& setup, bool) {
+       return setup.remesh.enabled && has_patches(setup) &&
+              (setup.remesh.sizing_field.enabled || setup.remesh.screening == Screening::energy_percentile);
+     }},
     {{"/materials/*/volume", "\"patches\" for a law without a part U(det F), with moduli that vary, or in plane stress"},
      [](const Setup<Dim>& setup, bool) {
        return std::any_of(setup.materials.begin(), setup.materials.end(), [&](const auto& e) {

@@ -125,6 +125,8 @@ constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
 constexpr double kLargePart = 5;                 ///< of what touches or falls [m]: above it lengths may be millimetres
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
+constexpr double kDense = 2200;                  ///< [kg/m^3]: of minerals and metals, above plastics and rubbers
+constexpr double kSoft = 1e7;                    ///< [Pa], softer than what is dense
 constexpr double kStiffnessRange = 20;           ///< of the barrier's, either way; a hundredfold costs 3 to 9 times
 constexpr double kRoundFraction = 0.01;          ///< of a body's volume, from which rounds are told of
 constexpr double kGravity[] = {9.7, 9.9};        ///< [m/s^2]
@@ -168,7 +170,12 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
     if (is_outside(material.youngs_modulus, kUsualModulus))
       found.push_back(fmt::format("body {}: E = {} is unusual: are moduli in {}?", set_text(setup.names.bodies, body),
                                   setup.units.text(material.youngs_modulus, "Pa", 3), setup.units.name("Pa")));
-    if (has_mass && is_outside(material.density, kUsualDensity))
+    else if (!has_named_units && material.youngs_modulus < kSoft && material.density > kDense &&
+             material.density < kUsualDensity[1])
+      found.push_back(fmt::format("body {}: E = {:.3g} Pa is unusual at a density of {:.4g} kg/m^3: are moduli in Pa?",
+                                  set_text(setup.names.bodies, body), material.youngs_modulus, material.density));
+    // Too large ones are of other units, as moduli then are, also where no mass counts.
+    if (is_outside(material.density, kUsualDensity) && (has_mass || material.density > kUsualDensity[1]))
       found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?",
                                   set_text(setup.names.bodies, body), setup.units.from_si(material.density, "kg/m^3"),
                                   setup.units.name("kg/m^3"), setup.units.name("kg/m^3")));
@@ -344,9 +351,11 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
       if (keeps_volume && material.poisson_ratio >= kIncompressible)
         found.push_back(fmt::format(
             "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
-            "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or "
-            "with a fixed mesh, where volumes are averaged over patches (/materials/*/volume)",
-            name, material.poisson_ratio));
+            "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or with {} "
+            "(/materials/*/volume)",
+            name, material.poisson_ratio,
+            setup.mesh.is_axisymmetric() ? "a fixed mesh, where volumes are averaged over patches"
+                                         : "volumes that are averaged over patches"));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(fmt::format(
           "body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "

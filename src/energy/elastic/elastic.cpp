@@ -9,6 +9,7 @@
 #include "core/parallel_reduce.hpp"
 #include "energy/round_off.hpp"
 #include "fem/displacement.hpp"
+#include "fem/shared_patches.hpp"
 #include "geometry/measures.hpp"
 #include "patched_volume.hpp"
 #include "point.hpp"
@@ -37,6 +38,18 @@ DisplacementGradient<Dim> displacement_gradient(const typename CellSet<Dim>::Ele
   Mat<Dim> edges;
   for (int k = 0; k < Dim; ++k) edges.col(k) = u.difference(element.vertices[0], element.vertices[k + 1]);
   return {edges * element.inverse_edges};
+}
+
+/// The law in an element without curved edges.
+template <int Dim>
+PatchedLaw law_in(const PatchPressures<Dim>& pressures, const ElasticModuli& moduli, std::size_t e) {
+  const auto* shared = SharedPatches<Dim>::of(pressures.patches);
+  if (!shared) return pressures.in_straight(moduli, e);
+  PatchedLaw law(moduli);
+  double pressure = 0;
+  for (const auto& [patch, weight] : shared->shares_of(e)) pressure += weight * pressures.values[patch];
+  if (!shared->shares_of(e).empty()) law.set_pressure(pressure);
+  return law;
 }
 
 /// Smallest root in (0, 1] of a + b t + c t^2 (+ d t^3) with a > 0; 2 if there is none.
@@ -204,7 +217,7 @@ double ElasticEnergy<Dim>::round_off_of(const Displacement<Dim>& u, ConstVectorV
   const double straight = sum_over_elements([&](std::size_t e) {
     const auto& element = cells_.elements[e];
     const auto at = displacement_gradient<Dim>(element, u);
-    const PatchedLaw here = pressures.in_straight(moduli(e), e);
+    const PatchedLaw here = law_in(pressures, moduli(e), e);
     return element.volume * (std::abs(elastic_density<Dim>(at, here)) + elastic_stress<Dim>(at, here).norm() * at.G.norm());
   });
   const double patches = patched_ ? std::abs(patched_->value(changes)) : 0;
@@ -216,7 +229,7 @@ void ElasticEnergy<Dim>::add_gradient_of(const Displacement<Dim>& u, ConstVector
   const PatchPressures<Dim> pressures = this->pressures(u);
   const auto forces_of = [&](std::size_t e) -> Mat<Dim> {  // on all vertices but the first
     const auto& element = cells_.elements[e];
-    const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), pressures.in_straight(moduli(e), e));
+    const Mat<Dim> P = elastic_stress<Dim>(displacement_gradient<Dim>(element, u), law_in(pressures, moduli(e), e));
     return scale_ * element.volume * P * element.inverse_edges.transpose();
   };
   parallel_then_ordered<Mat<Dim>>(cells_.straight().size(), kBlock, forces_of, [&](std::size_t e, const Mat<Dim>& forces) {
@@ -279,7 +292,7 @@ void ElasticEnergy<Dim>::add_hessian(ConstVectorView x, PsdProjection psd, Hessi
     const auto at = displacement_gradient<Dim>(element, u);
     const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
     const double weight = scale_ * element.volume;
-    const PatchedLaw law = pressures.in_straight(moduli(e), e);
+    const PatchedLaw law = law_in(pressures, moduli(e), e);
     const ElasticModuli& here = law;
     if (here.is_neo_hookean()) {
       exact_block<Dim>(at, gradients, here.lame, weight, block);

@@ -7,6 +7,7 @@
 #include "core/parallel_reduce.hpp"
 #include "energy/energy.hpp"
 #include "fem/hessian_sink.hpp"
+#include "fem/shared_patches.hpp"
 #include "fem/volume_patches.hpp"
 #include "geometry/cofactors.hpp"
 #include "strain.hpp"
@@ -71,6 +72,14 @@ std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) cons
     }
   });
   std::vector<double> changes(patches.count());
+  if (const auto* shared = SharedPatches<Dim>::of(&patches)) {  // of a trial, which is small
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      double sum = shared->outside[i];
+      for (const auto& [e, share] : patches.members_of(i)) sum += shared->shares[share].weight * of_element[e].back();
+      changes[i] = sum / patches.volume[i];
+    }
+    return changes;
+  }
   parallel_blocks(changes.size(), kPatches, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       double sum = 0;
@@ -109,6 +118,7 @@ VectorX PatchedVolume<Dim>::gradient_of(std::size_t patch, ConstVectorView x) co
   const VolumePatches<Dim>& patches = *cells_.patches;
   const auto nodes = patches.nodes_of(patch);
   const std::size_t straight = cells_.straight().size();
+  const auto* shared = SharedPatches<Dim>::of(&patches);
   VectorX gradient = VectorX::Zero(Dim * static_cast<Eigen::Index>(nodes.size()));
   const auto add = [&](int node, const Vec<Dim>& force) {
     const auto place = std::lower_bound(nodes.begin(), nodes.end(), node) - nodes.begin();
@@ -117,7 +127,8 @@ VectorX PatchedVolume<Dim>::gradient_of(std::size_t patch, ConstVectorView x) co
   for (const auto& [e, part] : patches.members_of(patch)) {
     const auto& element = cells_.elements[e];
     if (static_cast<std::size_t>(e) < straight) {
-      const Mat<Dim> C = element.volume * cofactors(deformation_gradient<Dim>(element, x));
+      const double weight = shared ? shared->shares[part].weight : 1;
+      const Mat<Dim> C = weight * element.volume * cofactors(deformation_gradient<Dim>(element, x));
       const auto gradients = barycentric_gradients<Dim>(element.inverse_edges);
       for (int k = 0; k <= Dim; ++k) add(element.vertices[k], C * gradients.col(k));
       continue;

@@ -105,6 +105,7 @@ LocalProblem<Dim>::LocalProblem(const RemeshState<Dim>& state, std::span<const C
   if (static_cast<int>(scratch_.local_of.size()) < mesh_.node_slots()) scratch_.local_of.resize(2 * mesh_.node_slots());
   scratch_.local_of_obstacle.resize(state.context.obstacles.x.size());
   add_cells(patch);
+  if (state.patches) add_patches(patch);
   if (needs_facets(state.context)) add_loaded_facets();
   hold_vertices();
   if (state.context.contact.enabled) add_surface();
@@ -116,6 +117,7 @@ LocalProblem<Dim>::~LocalProblem() {
   cells_.rest.clear();
   cells_.elements.clear();
   cells_.facets.clear();
+  cells_.patches.reset();
   vertices_.clear();
   changes_.clear();
   energy_.clear();
@@ -218,6 +220,14 @@ void LocalProblem<Dim>::add_cells(std::span<const CellId> patch) {
     add_cell({cell.vertices, cell.body, simplex_volume<Dim>(edges), edges.inverse(), mesh_.part(edit_.removed_cells[0])});
   }
   for (const auto& element : scratch_.curved) cells_.add(element);
+}
+
+/// Both sides have the patches before the edit, of which the parts outside stay as they are.
+template <int Dim>
+void LocalProblem<Dim>::add_patches(std::span<const CellId> patch) {
+  const CarriedPatches<Dim>& carried = *state_.patches;
+  using Shares = typename CarriedPatches<Dim>::Shares;
+  cells_.patches = carried.in(cells_, is_after_ ? carried.shares_after(mesh_, edit_) : std::vector<Shares>(), patch);
 }
 
 /// Makes the vertices of a simplex local, and finds its curved edges.

@@ -12,6 +12,7 @@
 
 #include "energy/incremental_potential.hpp"
 #include "newton/newton.hpp"
+#include "remesh/carried_patches.hpp"
 #include "remesh/contact/contact_reach.hpp"
 #include "remesh/contact/gate.hpp"
 #include "remesh/fields.hpp"
@@ -33,6 +34,7 @@ struct RemeshState {
   const StepContext<Dim>& context;
   const SurfaceIndex<Dim>& surface;  ///< at fields.x
   HistoryRule history;
+  const CarriedPatches<Dim>* patches = nullptr;  ///< null: no body averages its volume
 };
 
 /// A vertex of a local problem, or the node of a curved edge.
@@ -131,6 +133,7 @@ class LocalProblem {
   bool is_closed(const LocalVertex& v) const;
   std::uint64_t friction_sides_of(const LocalVertex& v) const;
   void add_cells(std::span<const CellId> patch);
+  void add_patches(std::span<const CellId> patch);
   void add_loaded_facets();
   void hold_vertices();
   void find_contacts();

@@ -142,7 +142,7 @@ double least_forgotten(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
 template <int Dim>
 double predict_gain(const RemeshState<Dim>& state, const Edit<Dim>& edit) {
   const StepContext<Dim>& context = state.context;
-  if (!is_predictable(context)) return kUnknown;
+  if (!is_predictable(context) || (state.patches && state.patches->act_in(edit.removed_cells))) return kUnknown;
   const bool has_curves = std::ranges::any_of(edit.removed_cells, [&](CellId c) { return state.mesh.is_curved(c); });
   if (has_curves || !edit.value) return predict_gain_of_each(state, edit, has_curves);
   const VertexId set = edit.value->vertex;

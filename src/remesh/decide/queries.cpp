@@ -167,7 +167,8 @@ template <int Dim>
 double RemeshQueries<Dim>::predict_split(const EdgeKey& edge, LocalScratch<Dim>& scratch, Box<Dim>* surface_read) const {
   const bool is_curved = mesh_.has_nodes() && any_is_curved(mesh_.cells_of_edge(edge));
   // Splits and curves stand in one queue: what the predictions cannot tell, local solves do of both.
-  if ((is_curved || options_.curve.enabled) && !is_predictable(context_))
+  const bool is_averaged = patches_ && patches_->act_in(mesh_.cells_of_edge(edge));
+  if (is_averaged || ((is_curved || options_.curve.enabled) && !is_predictable(context_)))
     return gain_of_vertex<Dim>(state(), make_split(mesh_, edge), scratch, surface_read);
   if (!is_curved) return itr::predict_split<Dim>(state(), edge);
   const double gain = itr::predict_split_at_curves<Dim>(state(), edge);
@@ -241,7 +242,8 @@ double RemeshQueries<Dim>::roughness(const Candidate& candidate) const {
 template <int Dim>
 double RemeshQueries<Dim>::largest_poisson_ratio(std::span<const CellId> cells) const {
   double nu = 0;
-  for (const CellId c : cells) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
+  for (const CellId c : cells)  // where the volume is averaged, what is left in the cells has about none
+    if (!patches_ || patches_->shares(c).empty()) nu = std::max(nu, context_.materials.at(mesh_.body(c)).poisson_ratio);
   return nu;
 }
 

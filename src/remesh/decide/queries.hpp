@@ -25,17 +25,20 @@ class RemeshQueries {
  public:
   RemeshQueries(const Mesh<Dim>& mesh, const RemeshFields<Dim>& fields, const StepContext<Dim>& context,
                 const RemeshOptions& options, const Strata<Dim>& strata, const Gate<Dim>& gate,
-                const Baseline<Dim>* baseline)
+                const Baseline<Dim>* baseline, const CarriedPatches<Dim>* patches)
       : mesh_(mesh),
         fields_(fields),
         context_(context),
         options_(options),
         strata_(strata),
         gate_(gate),
-        baseline_(baseline) {}
+        baseline_(baseline),
+        patches_(patches) {}
 
   const Mesh<Dim>& mesh() const { return mesh_; }
   const RemeshFields<Dim>& fields() const { return fields_; }
+  /// Null where no body averages its volume.
+  const CarriedPatches<Dim>* patches() const { return patches_; }
   const StepContext<Dim>& context() const { return context_; }
   const Strata<Dim>& strata() const { return strata_; }
   const RemeshOptions& options() const { return options_; }
@@ -128,7 +131,7 @@ class RemeshQueries {
   /// dhat.
   bool makes_short_chords(const EdgeKey& e) const;
   RemeshState<Dim> state(HistoryRule history = HistoryRule::function) const {
-    return {mesh_, fields_, context_, gate_.present(), history};
+    return {mesh_, fields_, context_, gate_.present(), history, patches_};
   }
   double largest_poisson_ratio(std::span<const CellId> cells) const;
   /// Cells that a trial's edit replaces, or that it will.
@@ -142,7 +145,8 @@ class RemeshQueries {
   const RemeshOptions& options_;
   const Strata<Dim>& strata_;
   const Gate<Dim>& gate_;
-  const Baseline<Dim>* baseline_;  ///< or null
+  const Baseline<Dim>* baseline_;       ///< or null
+  const CarriedPatches<Dim>* patches_;  ///< or null
 };
 
 }  // namespace itr

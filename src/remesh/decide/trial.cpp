@@ -110,7 +110,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
     const bool is_nested = edit.is_nested() || state.history == HistoryRule::interpolated;
     for (int check = is_nested || options.predicted ? 1 : 0; check < 2; ++check) {
       const HistoryRule history = check == 0 ? HistoryRule::interpolated : state.history;
-      const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history};
+      const RemeshState<Dim> judged{state.mesh, state.fields, state.context, state.surface, history, state.patches};
       is_enough = false;
       const auto bound = compare<Dim>(judged, scratch.star, edit, options.required, noise_fraction, kBoundIterations,
                                       kBoundContactIterations, scratch, [&](auto&) { is_enough = true; });

@@ -38,6 +38,7 @@ Change<Dim> ChangeLog<Dim>::commit(const Edit<Dim>& edit, std::span<const Positi
       if (v < first_slot) write_surface(v);
   }
 
+  for (const auto& prepare : forerunners_) prepare(edit);
   const CellId first_cell = mesh_.cell_slots();
   const FacetId first_facet = mesh_.facet_slots();
   Change<Dim> change{.edit = edit, .created = mesh_.apply(edit), .first_facet = first_facet, .first_node = kNone};

@@ -34,6 +34,8 @@ class ChangeLog {
       : mesh_(mesh), x_(x), logs_surface_(logs_surface), touched_(mesh.node_slots()) {}
   /// Followers are called in the order in which they were added.
   void add_follower(std::function<void(const Change<Dim>&)> follower) { followers_.push_back(std::move(follower)); }
+  /// Called before the mesh has the edit, in their order.
+  void add_forerunner(std::function<void(const Edit<Dim>&)> forerunner) { forerunners_.push_back(std::move(forerunner)); }
   /// Applies an edit with the positions to which it relaxed.
   Change<Dim> commit(const Edit<Dim>& edit, std::span<const Position> positions);
 
@@ -63,6 +65,7 @@ class ChangeLog {
   Mesh<Dim>& mesh_;
   const VectorX& x_;
   bool logs_surface_;
+  std::vector<std::function<void(const Edit<Dim>&)>> forerunners_;
   std::vector<std::function<void(const Change<Dim>&)>> followers_;
   std::vector<Touched> touched_;    ///< by vertex
   std::vector<Box<Dim>> surfaces_;  ///< by commit

@@ -165,10 +165,20 @@ class Pipeline {
         }))
       return true;
     const Mesh<Dim>& mesh = queries_.mesh();
+    if (queries_.patches() && has_other_volume(trial)) return true;
     return std::ranges::any_of(trial.verdict.patch, [&](CellId c) {
       return !mesh.is_cell_alive(c) ||
              std::ranges::any_of(mesh.cell(c), [&](VertexId v) { return log.was_written(v, batch_began_); });
     });
+  }
+
+  /// Whether a commit of this batch has changed the mean volume of a patch that a trial has read.
+  bool has_other_volume(const Trial<Dim>& trial) const {
+    const Mesh<Dim>& mesh = queries_.mesh();
+    const auto is_other = [&](CellId c) { return queries_.patches()->was_written(c, batch_began_); };
+    return std::ranges::any_of(trial.candidate().vertices(),
+                               [&](VertexId v) { return std::ranges::any_of(mesh.cells_of(v), is_other); }) ||
+           std::ranges::any_of(trial.verdict.patch, is_other);
   }
 
   /// Counts a trial, and commits it where it was accepted; the verdict's patch then has the new cells too.

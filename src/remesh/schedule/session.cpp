@@ -47,7 +47,10 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
       stored_(memory),
       gate_(mesh, fields, context),
       log_(mesh, fields.x, context.contact.enabled),
-      queries_(mesh, fields, context, options, strata, gate_, baseline_.get()),
+      patches_(any_averages_volume(context.materials)
+                   ? std::make_unique<CarriedPatches<Dim>>(mesh, fields.x, context.materials)
+                   : nullptr),
+      queries_(mesh, fields, context, options, strata, gate_, baseline_.get(), patches_.get()),
       memory_(memory, !baseline_ || baseline_->has_bounds(), log_),
       lanes_(context.host.empty() ? num_threads() : 1) {  // terms of the program may not be for several threads
   if (strata.empty()) strata = Strata<Dim>(mesh);
@@ -57,6 +60,7 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
     fields.follow(change.edit, change.created, change.first_node);
     for (const auto& [v, x] : change.positions) fields.x.template segment<Dim>(Dim * v) = x;
   });
+  if (patches_) carry_patches(mesh);
   log_.add_follower([&](const Change<Dim>& change) {  // reads the positions of the follower before
     gate_.follow(change.edit, change.first_facet);
     if (context.contact.enabled)
@@ -68,6 +72,17 @@ RemeshSession<Dim>::RemeshSession(Mesh<Dim>& mesh, RemeshFields<Dim>& fields, co
     ITR_AUDIT(mesh.find_defect().empty(), mesh.find_defect());
     ITR_AUDIT(find_inverted(mesh, fields.x) == kNone, find_inverted(mesh, fields.x));
     for ([[maybe_unused]] const VectorX& past : fields.past_positions) ITR_AUDIT(find_inverted(mesh, past) == kNone);
+  });
+}
+
+/// Follows the positions of the first follower.
+template <int Dim>
+void RemeshSession<Dim>::carry_patches(const Mesh<Dim>& mesh) {
+  log_.add_forerunner([&](const Edit<Dim>& edit) { shares_ = patches_->shares_after(mesh, edit); });
+  log_.add_follower([&](const Change<Dim>& change) {
+    std::vector<VertexId> moved;
+    for (const auto& [v, x] : change.positions) moved.push_back(v);
+    patches_->follow(mesh, change.edit, std::move(shares_), change.cells, moved, fields_.x, log_.now());
   });
 }
 

@@ -110,11 +110,15 @@ class RemeshSession {
   LocalScratch<Dim>& scratch() { return lanes_.front(); }
 
  private:
+  void carry_patches(const Mesh<Dim>& mesh);
+
   std::unique_ptr<Baseline<Dim>> baseline_;
   RemeshFields<Dim>& fields_;
   RemeshMemory& stored_;
   Gate<Dim> gate_;
   ChangeLog<Dim> log_;
+  std::unique_ptr<CarriedPatches<Dim>> patches_;              ///< null: no body averages its volume
+  std::vector<typename CarriedPatches<Dim>::Shares> shares_;  ///< in the cells of the edit that is committed
   RemeshQueries<Dim> queries_;
   SessionMemory<Dim> memory_;
   std::deque<LocalScratch<Dim>> lanes_;

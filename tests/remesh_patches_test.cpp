@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: MIT
+// Near-incompressible bodies whose patches edits carry: trials against the energy of the whole mesh, what splits and
+// collapses may gain, cycles of refining and coarsening, threads.
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <random>
+
+#include "core/parallel.hpp"
+#include "fem/inverted.hpp"
+#include "random_cube.hpp"
+#include "random_mesh.hpp"
+#include "remesh/decide/patch.hpp"
+#include "remesh/remesher.hpp"
+#include "remesh_options.hpp"
+
+namespace itr {
+namespace {
+
+/// Elasticity alone, on a random mesh near a smooth deformation.
+template <int Dim>
+struct Scene {
+  std::mt19937 random;
+  Mesh<Dim> mesh;
+  RemeshFields<Dim> fields;
+  StepContext<Dim> context;
+
+  explicit Scene(unsigned seed, int n, double nu, double noise) : random(seed), mesh(make(n)) {
+    Material rubber{.youngs_modulus = 3, .poisson_ratio = nu, .density = 1, .plane_strain = Dim == 2};
+    rubber.volume = VolumeForm::patches;
+    context.materials = {{1, rubber}, {2, rubber}};
+    context.has_inertia = false;
+    context.scaling = 1;
+    context.newton.step_tolerance = 1e-10;
+    context.shortest_edge = 0.5 / n;
+    context.longest_edge = 2.0 / n;
+    context.held_components = {{4, {}}};
+    context.held_components[4].fill(true);
+    std::uniform_real_distribution<double> shift(-noise, noise);
+    fields.x.resize(Dim * mesh.node_slots());
+    for (int v = 0; v < mesh.node_slots(); ++v) {
+      Vec<Dim> x = mesh.rest(v);
+      x[0] += 0.1 * mesh.rest(v)[1] * mesh.rest(v)[1];
+      for (int c = 0; c < Dim; ++c) fields.x[Dim * v + c] = x[c] + shift(random);
+    }
+  }
+  Mesh<Dim> make(int n) {
+    if constexpr (Dim == 2)
+      return random_mesh(n, random);
+    else
+      return make_cube(n, random, 0.15);
+  }
+  std::vector<CellId> cells() const {
+    std::vector<CellId> alive;
+    for (const CellId c : mesh.live_cells()) alive.push_back(c);
+    return alive;
+  }
+  /// Of the whole mesh with these patches.
+  double energy(const CarriedPatches<Dim>& patches) const {
+    CellSet<Dim> all;
+    all.num_vertices = mesh.node_slots();
+    all.rest = mesh.rest();
+    for (const CellId c : cells()) all.elements.push_back(element_of(mesh, c));
+    all.patches = patches.in(all, {}, cells());
+    Workspace workspace;
+    return ElasticEnergy<Dim>(all, context.materials, context.scaling).value(fields.x, workspace);
+  }
+};
+
+/// An edit that follows its mesh, its fields and the patches.
+template <int Dim>
+void commit(const Edit<Dim>& edit, const std::vector<typename LocalProblem<Dim>::Position>& positions, Scene<Dim>& scene,
+            CarriedPatches<Dim>& patches, unsigned number) {
+  auto shares = patches.shares_after(scene.mesh, edit);
+  const CellId first = scene.mesh.cell_slots();
+  const VertexId created = scene.mesh.apply(edit);
+  scene.fields.make_room(scene.mesh.node_slots());
+  scene.fields.follow(edit, created);
+  scene.fields.trim(scene.mesh.node_slots());
+  std::vector<VertexId> moved;
+  for (const auto& [v, x] : positions) {
+    moved.push_back(v == kNewVertex ? created : v);
+    scene.fields.x.template segment<Dim>(Dim * moved.back()) = x;
+  }
+  std::vector<CellId> cells;
+  for (CellId c = first; c < scene.mesh.cell_slots(); ++c) cells.push_back(c);
+  patches.follow(scene.mesh, edit, std::move(shares), cells, moved, scene.fields.x, number);
+}
+
+/// Any edit in 2D; a split or a collapse in 3D.
+std::optional<Edit<2>> any_edit(const Mesh<2>& mesh, std::mt19937& random) { return random_edit(mesh, random); }
+std::optional<Edit<3>> any_edit(const Mesh<3>& mesh, std::mt19937& random) {
+  const auto edges = mesh.edges();
+  const EdgeKey edge = edges[random() % edges.size()];
+  return random() % 2 ? std::optional(make_split(mesh, edge)) : propose_collapse(mesh, Strata<3>(mesh), edge).edit;
+}
+
+template <typename T>
+class CarriedPatchesOf : public ::testing::Test {};
+using Dimensions = ::testing::Types<std::integral_constant<int, 2>, std::integral_constant<int, 3>>;
+TYPED_TEST_SUITE(CarriedPatchesOf, Dimensions);
+
+/// A trial, which knows a few cells, finds the difference of the whole energy with the same patches.
+TYPED_TEST(CarriedPatchesOf, TrialsSeeTheEnergyOfTheWholeMesh) {
+  constexpr int Dim = TypeParam::value;
+  Scene<Dim> scene(3, Dim == 2 ? 8 : 4, 0.49, 0.01 / Dim);
+  CarriedPatches<Dim> patches(scene.mesh, scene.fields.x, scene.context.materials);
+  LocalScratch<Dim> scratch;
+  Marks marks;
+  std::vector<CellId> patch;
+  int edits = 0, shared = 0;
+  for (unsigned i = 1; i <= 150; ++i) {
+    const auto edit = any_edit(scene.mesh, scene.random);
+    if (!edit) continue;
+    const Gate<Dim> gate(scene.mesh, scene.fields, scene.context);
+    if (!gate.passes(*edit, scratch.gate)) continue;
+    const RemeshState<Dim> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::function, &patches};
+    select_patch<Dim>(scene.mesh, *edit, {}, marks, patch);
+    LocalProblem<Dim> before(state, patch, *edit, false, scratch), after(state, patch, *edit, true, scratch);
+    const double was = before.value(), whole = scene.energy(patches);
+    if (i % 3 == 0 && after.has_unknowns()) after.relax(2);
+    const double is = after.value();
+    std::vector<typename LocalProblem<Dim>::Position> positions;
+    if (after.has_unknowns()) after.get_positions(positions);
+    commit<Dim>(*edit, positions, scene, patches, i);
+    ASSERT_NEAR(is - was, scene.energy(patches) - whole, 1e-9 * whole) << "edit " << i;
+    ++edits;
+    for (const CellId c : scene.cells()) shared += patches.shares(c).size() > 1;
+  }
+  EXPECT_GT(edits, 50);
+  EXPECT_GT(shared, 0);
+}
+
+/// Weights are partitions of one, and each patch keeps its volume, after any edits.
+TYPED_TEST(CarriedPatchesOf, WeightsAddUpToOneAndPatchesKeepTheirVolume) {
+  constexpr int Dim = TypeParam::value;
+  Scene<Dim> scene(5, Dim == 2 ? 8 : 4, 0.49, 0);
+  CarriedPatches<Dim> patches(scene.mesh, scene.fields.x, scene.context.materials);
+  const auto volumes = [&] {
+    std::map<int, double> of_patch;
+    for (const CellId c : scene.cells()) {
+      double sum = 0;
+      for (const auto& [patch, weight] : patches.shares(c)) {
+        EXPECT_GT(weight, 0);
+        sum += weight;
+        of_patch[patch] += weight * scene.mesh.volume(c);
+      }
+      EXPECT_NEAR(sum, 1, 1e-12);
+    }
+    return of_patch;
+  };
+  const auto were = volumes();
+  for (unsigned i = 1; i <= 200; ++i)
+    if (const auto edit = any_edit(scene.mesh, scene.random)) commit<Dim>(*edit, {}, scene, patches, i);
+  const auto are = volumes();
+  ASSERT_EQ(are.size(), were.size());
+  for (const auto& [patch, volume] : were) EXPECT_NEAR(are.at(patch), volume, 1e-12);
+}
+
+/// A finer space never has more energy with the same patches; the functions stay what they are until it relaxes.
+TYPED_TEST(CarriedPatchesOf, AThousandSplitsNeverRaiseTheEnergy) {
+  constexpr int Dim = TypeParam::value;
+  Scene<Dim> scene(7, Dim == 2 ? 6 : 3, 0.4999, 0.004);
+  CarriedPatches<Dim> patches(scene.mesh, scene.fields.x, scene.context.materials);
+  LocalScratch<Dim> scratch;
+  double energy = scene.energy(patches);
+  const double first = energy;
+  for (unsigned i = 1; i <= 1000; ++i) {
+    const auto edges = scene.mesh.edges();
+    const auto longest = [&](const EdgeKey& e) { return (scene.mesh.rest(e[0]) - scene.mesh.rest(e[1])).squaredNorm(); };
+    EdgeKey edge = edges[scene.random() % edges.size()];
+    for (int k = 0; k < 5; ++k)  // long ones, so that cells stay of one size
+      if (const EdgeKey other = edges[scene.random() % edges.size()]; longest(other) > longest(edge)) edge = other;
+    const Edit<Dim> edit = make_split(scene.mesh, edge);
+    const Gate<Dim> gate(scene.mesh, scene.fields, scene.context);
+    const RemeshState<Dim> state{scene.mesh, scene.fields, scene.context, gate.present(), HistoryRule::function, &patches};
+    std::vector<CellId> star = edit.removed_cells;
+    std::vector<typename LocalProblem<Dim>::Position> positions;
+    {
+      LocalProblem<Dim> before(state, star, edit, false, scratch), after(state, star, edit, true, scratch);
+      ASSERT_NEAR(after.value(), before.value(), 1e-10 * energy) << "split " << i;
+      if (after.has_unknowns()) {
+        after.relax(4);
+        after.get_positions(positions);
+      }
+    }
+    commit<Dim>(edit, positions, scene, patches, i);
+    const double now = scene.energy(patches);
+    ASSERT_LE(now, energy * (1 + 1e-10)) << "split " << i;
+    energy = now;
+  }
+  EXPECT_LT(energy, 0.9 * first);
+}
+
+/// Remeshes, and makes the mesh compact.
+template <int Dim>
+RemeshReport remesh_once(const RemeshOptions& options, Scene<Dim>& scene) {
+  RemeshMemory memory;
+  Strata<Dim> strata;
+  const RemeshReport report = remesh(scene.mesh, scene.fields, scene.context, options, memory, strata);
+  const VectorX slots = scene.fields.x;
+  const MeshRenumbering number = scene.mesh.compact();
+  scene.fields.x.resize(Dim * scene.mesh.node_slots());
+  for (std::size_t v = 0; v < number.vertex.size(); ++v)
+    if (number.vertex[v] != kNone)
+      scene.fields.x.template segment<Dim>(Dim * number.vertex[v]) = slots.segment<Dim>(Dim * static_cast<Eigen::Index>(v));
+  return report;
+}
+
+TYPED_TEST(CarriedPatchesOf, RemeshingIsTheSameOnAnyNumberOfThreads) {
+  constexpr int Dim = TypeParam::value;
+  RemeshOptions options = remesh_options();
+  options.split.acceptance_tolerance = Dim == 2 ? 2e-4 : 2e-3;
+  options.collapse.rel_max_edge_length = 100;
+  options.swap.enabled = Dim == 2;
+  std::vector<VectorX> found;
+  for (const int threads : {1, 3}) {
+    const ThreadLimit limit(threads);
+    Scene<Dim> scene(11, Dim == 2 ? 10 : 4, 0.499, 0.002);
+    const RemeshReport report = remesh_once(options, scene);
+    EXPECT_GT(report.splits.accepted, 10);
+    EXPECT_GT(report.collapses.accepted, 0);
+    found.push_back(scene.fields.x);
+  }
+  EXPECT_TRUE(found[0].size() == found[1].size() && found[0] == found[1]);
+}
+
+/// A body that is bent and let go again and again: no gain is left over from fewer patches or old ones.
+TEST(CarriedPatches, NothingDriftsOverAHundredCycles) {
+  Scene<2> scene(13, 6, 0.499, 0);
+  RemeshOptions options = remesh_options();
+  options.split.acceptance_tolerance = 1e-4;
+  options.collapse.rel_max_edge_length = 2;
+  std::vector<double> energies;
+  std::vector<int> fine, coarse;
+  for (int cycle = 0; cycle < 100; ++cycle) {
+    for (const VertexId v : scene.mesh.live_vertices()) {
+      const Vec<2>& X = scene.mesh.rest(v);  // a shear, which keeps areas
+      scene.fields.x.segment<2>(2 * v) = X + Vec<2>(0.15 * std::sin(3 * X[1]), 0);
+    }
+    const RemeshReport refined = remesh_once(options, scene);
+    ASSERT_EQ(find_inverted<2>(scene.mesh, scene.fields.x), kNone);
+    EXPECT_GT(refined.splits.accepted, 0);
+    fine.push_back(scene.mesh.num_vertices());
+    energies.push_back(scene.energy(CarriedPatches<2>(scene.mesh, scene.fields.x, scene.context.materials)));
+    for (const VertexId v : scene.mesh.live_vertices()) scene.fields.x.segment<2>(2 * v) = scene.mesh.rest(v);
+    EXPECT_GT(remesh_once(options, scene).collapses.accepted, 0);
+    coarse.push_back(scene.mesh.num_vertices());
+  }
+  const auto mean = [](const auto& values, int first) {
+    return std::accumulate(values.begin() + first, values.begin() + first + 20, 0.0) / 20;
+  };
+  EXPECT_NEAR(mean(fine, 80), mean(fine, 5), 0.15 * mean(fine, 5));
+  EXPECT_NEAR(mean(coarse, 80), mean(coarse, 5), 0.15 * mean(coarse, 5));
+  EXPECT_NEAR(mean(energies, 80), mean(energies, 5), 0.1 * mean(energies, 5));
+}
+
+}  // namespace
+}  // namespace itr
