@@ -307,19 +307,26 @@ TEST_F(SceneTest, NearlyIncompressibleBodiesAverageTheirVolume) {
   EXPECT_EQ(form({{"type", "Yeoh"}, {"C", {1}}, {"K", 45}, {"rho", 1}}), kPointwise);
   EXPECT_EQ(form({{"type", "MooneyRivlin"}, {"c1", 1}, {"c2", 0.2}, {"k", 200}, {"rho", 1}}), kPatches);
   EXPECT_EQ(form(rubber(0.49), {{"defaults", "polyfem"}}), kPointwise);
-  const auto remeshed = [&](json remesh, int order = 1) {
+  const auto remeshed = [&](json remesh, int order = 1, bool quasistatic = true) {
     remesh["enabled"] = true;
-    return form(rubber(0.49), {{"space", {{"remesh", remesh}, {"discr_order", order}}}});
+    const json time = {{"tend", 1}, {"dt", 1}, {"quasistatic", quasistatic}};
+    return form(rubber(0.49), {{"time", time}, {"space", {{"remesh", remesh}, {"discr_order", order}}}});
   };
   EXPECT_EQ(remeshed(json::object()), kPatches);
   EXPECT_EQ(remeshed(json::object(), 2), kPointwise);
-  EXPECT_EQ(form(rubber(0.49), {{"space", {{"remesh", {{"enabled", true}}}}},
-                                {"boundary_conditions", {{"pressure_boundary", {{{"id", 1}, {"value", 1}}}}}}}),
-            kPointwise);
+  EXPECT_EQ(remeshed(json::object(), 1, false), kPointwise);
+  json pressed = square({{"materials", rubber(0.49)},
+                         {"time", {{"tend", 1}, {"dt", 1}, {"quasistatic", true}}},
+                         {"space", {{"remesh", {{"enabled", true}}}}}});
+  pressed.erase("defaults");
+  pressed["geometry"][0]["surface_selection"] = 1;
+  pressed["boundary_conditions"]["pressure_boundary"] = json::array({{{"id", 1}, {"value", 1}}});
+  EXPECT_EQ(read2(pressed).materials.at(1).volume, kPointwise);
   EXPECT_EQ(remeshed({{"curve", {{"enabled", true}}}}), kPointwise);
   EXPECT_EQ(remeshed({{"screening", "energy-percentile"}}), kPointwise);
-  EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}),
-                 {{"axisymmetric", true}, {"space", {{"remesh", {{"enabled", true}}}}}}),
+  EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}), {{"axisymmetric", true},
+                                                             {"time", {{"tend", 1}, {"dt", 1}, {"quasistatic", true}}},
+                                                             {"space", {{"remesh", {{"enabled", true}}}}}}),
             kPointwise);
   EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}), {{"axisymmetric", true}}), kPatches);
   for (const auto& [order, expected] : {std::pair{1, kPatches}, {2, kPointwise}}) {  // of tetrahedra
