@@ -55,7 +55,7 @@ struct Scene {
     for (const CellId c : mesh.live_cells()) alive.push_back(c);
     return alive;
   }
-  /// Of the whole mesh with these patches.
+  /// Returns that of the whole mesh with these patches.
   double energy(const CarriedPatches<Dim>& patches) const {
     CellSet<Dim> all;
     all.num_vertices = mesh.node_slots();
