@@ -321,5 +321,24 @@ TEST(PatchesOfRemeshedMeshes, InfSupValuesAreBoundedBelow) {
   }
 }
 
+TEST(PatchesOfRemeshedMeshes, InfSupValuesOfTetrahedraAreBoundedBelow) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    Mesh<3> mesh = make_cube(3, random, 0.15);
+    int collapses = 0;
+    for (int i = 0; i < 120; ++i) {
+      const auto edges = mesh.edges();
+      const EdgeKey edge = edges[random() % edges.size()];
+      const auto edit =
+          i % 3 == 0 ? std::optional(make_split(mesh, edge)) : propose_collapse(mesh, Strata<3>(mesh), edge).edit;
+      if (edit) mesh.apply(*edit);
+      collapses += edit && i % 3 != 0;
+      mesh.compact();
+    }
+    EXPECT_GT(collapses, 10);
+    EXPECT_GE(inf_sup<3>(mesh), 0.2) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace itr

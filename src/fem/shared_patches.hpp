@@ -22,7 +22,7 @@ struct SharedPatches : VolumePatches<Dim> {
   std::vector<Share> shares;                ///< in elements of bodies with patches weights add up to 1
   std::vector<double> outside;              ///< by patch: integral of w_i (J - 1) over cells that are not here [m^Dim]
 
-  /// The same patches, or null where they have no shares.
+  /// Returns the same patches, or null where they have no shares.
   static const SharedPatches* of(const VolumePatches<Dim>* patches) {
     return patches && patches->patch_of.empty() ? static_cast<const SharedPatches*>(patches) : nullptr;
   }

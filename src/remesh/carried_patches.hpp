@@ -29,7 +29,7 @@ class CarriedPatches {
 
   /// Whether patches act in one of these alive cells.
   bool act_in(std::span<const CellId> cells) const;
-  /// Of an alive cell; none outside of these bodies.
+  /// Returns those of an alive cell; none outside of these bodies.
   const Shares& shares(CellId c) const { return shares_[c]; }
   /// Weights in the cells that an edit of the mesh inserts: their means over these cells. Those of a split stay the
   /// functions that they were.

@@ -317,10 +317,13 @@ LawSum read_law_sum(const Node& node, int dimension) {
   return read_sum_of_laws(node, law, dimension, dimension, requirements);
 }
 
-/// Whether remeshing, if there is any, carries patches: on linear elements, and where energies of trials decide.
+/// Whether remeshing, if there is any, carries patches: on linear elements, and where energies of trials decide. By default
+/// neither under pressure, which does not always settle there, nor with inertia (docs/theory.md, "Patches under remeshing").
 static bool can_carry_patches(const Node& root) {
-  const Node space = root["space"], remesh = space["remesh"];
+  const Node space = root["space"], remesh = space["remesh"], conditions = root["boundary_conditions"];
   if (!remesh["enabled"].boolean(false)) return true;
+  if (root.has("time") && !root["time"]["quasistatic"].boolean(false)) return false;
+  if (!conditions["pressure_boundary"].items().empty() || !conditions["pressure_cavity"].items().empty()) return false;
   return (!space["discr_order"].exists() || space["discr_order"].json() == 1) && !is_axisymmetric(root) &&
          !remesh["curve"]["enabled"].boolean(false) && !remesh["sizing_field"]["enabled"].boolean(false) &&
          !(remesh["screening"].exists() && remesh["screening"].json() == "energy-percentile");
