@@ -406,10 +406,12 @@ class Reports(Case):
         self.assertIn("/boundary_conditions/rhs: sin(30) is of radians, of more than a full turn; deg2rad() takes degrees", degrees)
         steel = {"E": 210000, "rho": 7850}
         self.assertIn("E = 2.1e+05 Pa is unusual at a density of 7850 kg/m^3: are moduli in Pa?", words(material=steel))
-        tonnes = words(material={"rho": 1000}, units={"length": "mm", "mass": "t", "time": "s"},
-                       time={"dt": 1, "tend": 1, "quasistatic": True}, boundary_conditions={"dirichlet_boundary": [
-                           {"id": 2, "value": [0, 0]}]})
+        still = {"time": {"dt": 1, "tend": 1, "quasistatic": True},
+                 "boundary_conditions": {"dirichlet_boundary": [{"id": 2, "value": [0, 0]}]}}
+        tonnes = words(units={"length": "mm", "mass": "t", "time": "s"}, **still)
         self.assertIn("rho = 1e+03 t/mm^3 is unusual", tonnes)
+        self.assertIn("rho = 1.1e-09 kg/m^3 is unusual", words(material={"E": 2000, "rho": 1.1e-9}, **still))
+        self.assertNotIn("is unusual", words(material={"rho": 1}, **still))
         usual = words()
         for part in ("is of radians", "is unusual"):
             self.assertNotIn(part, usual)

@@ -49,7 +49,7 @@ def meridian():
 
 def sphere_in_rubber(context):
     """A rigid sphere that is pressed into a quarter of a round block by a fifth of its height."""
-    write_mesh(context.folder / "block3.msh", *quarter(5, 4))
+    write_mesh(context.folder / "block3.msh", *quarter(8, 6))
     points = [(0.0, 0.0, -SPHERE)] + [(r * math.cos(2 * math.pi * i / AROUND), r * math.sin(2 * math.pi * i / AROUND), -z)
                                       for r, z in meridian() for i in range(AROUND)]
     at = lambda k, i: 2 + (k - 1) * AROUND + i % AROUND

@@ -124,6 +124,7 @@ constexpr double kLargeRatio = 1e3;              ///< of element sizes, from whi
 constexpr double kUsualLength[] = {1e-4, 1e3};   ///< of a scene in metres
 constexpr double kLargePart = 5;                 ///< of what touches or falls [m]: above it lengths may be millimetres
 constexpr double kUsualDensity[] = {10, 3e4};    ///< of solids [kg/m^3]
+constexpr double kAnyDensity[] = {1e-3, 3e4};    ///< of what scenes without inertia write [kg/m^3]
 constexpr double kUsualModulus[] = {1e3, 1e13};  ///< [Pa]
 constexpr double kDense = 2200;                  ///< [kg/m^3]: of minerals and metals, above plastics and rubbers
 constexpr double kSoft = 1e7;                    ///< [Pa], softer than what is dense
@@ -174,8 +175,8 @@ void find_odd_units(const Setup<Dim>& setup, const MeshFigures<Dim>& figures, st
              material.density < kUsualDensity[1])
       found.push_back(fmt::format("body {}: E = {:.3g} Pa is unusual at a density of {:.4g} kg/m^3: are moduli in Pa?",
                                   set_text(setup.names.bodies, body), material.youngs_modulus, material.density));
-    // Too large ones are of other units, as moduli then are, also where no mass counts.
-    if (is_outside(material.density, kUsualDensity) && (has_mass || material.density > kUsualDensity[1]))
+    // Densities of no matter are of other units, as moduli then are, also where no mass counts.
+    if (is_outside(material.density, has_mass ? kUsualDensity : kAnyDensity))
       found.push_back(fmt::format("body {}: rho = {:.3g} {} is unusual: are densities in {}?",
                                   set_text(setup.names.bodies, body), setup.units.from_si(material.density, "kg/m^3"),
                                   setup.units.name("kg/m^3"), setup.units.name("kg/m^3")));
