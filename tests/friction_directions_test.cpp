@@ -2,6 +2,7 @@
 // Friction by pair with two coefficients, along a direction and across it.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 #include <random>

@@ -2,6 +2,7 @@
 // Friction by pair, with static and kinetic coefficients.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <random>

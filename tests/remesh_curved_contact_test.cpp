@@ -286,7 +286,8 @@ TYPED_TEST(CurvedContact, PredictionsSayWhatTheyReadOfTheSurface) {
       const bool is_curved = scene.mesh.node_of(edge[0], edge[1]) != kNone;
       const auto predict = [&](Box<Dim>& box) {
         const Gate<Dim> gate(scene.mesh, scene.fields, scene.context);
-        const RemeshQueries<Dim> queries(scene.mesh, scene.fields, scene.context, options, scene.strata, gate, nullptr);
+        const RemeshQueries<Dim> queries(scene.mesh, scene.fields, scene.context, options, scene.strata, gate, nullptr,
+                                         nullptr);
         LocalScratch<Dim> scratch;
         return is_curved ? queries.predict_split(edge, scratch, &box) : queries.predict_curve(edge, scratch, &box);
       };

@@ -49,7 +49,7 @@ TYPED_TEST(CurvedPrediction, CullingSeesWhatNodesStore) {
   options.split.min_edge_length = 0;
   const Gate<Dim> gate(scene.mesh, scene.fields, context);
   const auto culling = Baseline<Dim>::chosen_by(options);
-  culling->rank(RemeshQueries<Dim>(scene.mesh, scene.fields, context, options, scene.strata, gate, culling.get()));
+  culling->rank(RemeshQueries<Dim>(scene.mesh, scene.fields, context, options, scene.strata, gate, culling.get(), nullptr));
   EXPECT_TRUE(culling->may_split(bent));
   int may = 0;
   for (const EdgeKey& edge : scene.mesh.edges()) may += culling->may_split(edge);

@@ -241,7 +241,7 @@ TYPED_TEST(Curved, RefusalsDoNotKeepCellsDistorted) {
     options.split.min_edge_length = 0;
     options.collapse.acceptance_tolerance = options.straighten.acceptance_tolerance = -1e-12;
     const Gate<Dim> gate(scene.mesh, scene.fields, context);
-    const RemeshQueries<Dim> queries(scene.mesh, scene.fields, context, options, scene.strata, gate, nullptr);
+    const RemeshQueries<Dim> queries(scene.mesh, scene.fields, context, options, scene.strata, gate, nullptr, nullptr);
     if (!queries.is_distorted(scene.mesh.cells_of_edge(edge))) continue;
     ++distorted;
     RemeshMemory memory;
