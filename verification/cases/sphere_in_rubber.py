@@ -83,7 +83,7 @@ def of_revolution(context):
              "contact": {"enabled": True, "friction_coefficient": 0.3},
              "output": {"forces": [{"name": "force", "obstacles": 12}]}}
     for level in range(LEVELS + 1):
-        yield f"of revolution, refined {level}", refined(scene, level), lambda rows, _: abs(rows[-1]["all_y"]) / 4
+        yield f"of revolution refined {level}", refined(scene, level), lambda rows, _: abs(rows[-1]["all_y"]) / 4
 
 
 def results(context):

@@ -12,7 +12,7 @@ FORCE, UNITS, COST = 0.03, 0.005, 2
 LEVELS = 3  # of refinement of the converged value
 HONEST = 2  # times the error, or a share of it: what a warning may say of it
 SHORT, REPEATS = 1.0, 3  # runs of fewer seconds are timed so often
-QUADRATIC = "fixed, quadratic"
+QUADRATIC = "fixed quadratic"
 REMESHED = {"space": {"remesh": {"enabled": True}}}
 
 
@@ -206,7 +206,7 @@ class Held:
     def fixed_meshes(self):
         first = 0 if is_remeshed(self.scene) else 1  # the default is on the mesh itself
         for level in range(first, 1 + (1 if self.context.quick else LEVELS)):
-            yield f"fixed, refined {level}", refined(fixed(self.scene), level), self.quantity
+            yield f"fixed refined {level}", refined(fixed(self.scene), level), self.quantity
 
     def converged(self):
         """The exact value, or that of the finest mesh."""
