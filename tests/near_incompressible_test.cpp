@@ -334,6 +334,9 @@ TEST_F(SceneTest, NearlyIncompressibleBodiesAverageTheirVolume) {
     scene["geometry"][0]["mesh"] = "tet.msh";
     scene.erase("defaults");
     EXPECT_EQ(std::get<itr::Setup<3>>(read_scene(scene).setup).materials.at(1).volume, expected) << order;
+    scene["space"]["remesh"]["enabled"] = true;
+    scene["time"]["quasistatic"] = true;
+    EXPECT_EQ(std::get<itr::Setup<3>>(read_scene(scene).setup).materials.at(1).volume, kPointwise) << order;
   }
 }
 

@@ -318,11 +318,11 @@ LawSum read_law_sum(const Node& node, int dimension) {
 }
 
 /// Whether remeshing, if there is any, carries patches: on linear elements, and where energies of trials decide. By default
-/// neither under pressure, which does not always settle there, nor with inertia (docs/theory.md, "Patches under remeshing").
-static bool can_carry_patches(const Node& root) {
+/// neither in 3D nor under pressure nor with inertia, for what that costs (docs/theory.md, "Patches under remeshing").
+static bool carries_patches(const Node& root, int dimension) {
   const Node space = root["space"], remesh = space["remesh"], conditions = root["boundary_conditions"];
   if (!remesh["enabled"].boolean(false)) return true;
-  if (root.has("time") && !root["time"]["quasistatic"].boolean(false)) return false;
+  if (dimension == 3 || (root.has("time") && !root["time"]["quasistatic"].boolean(false))) return false;
   if (!conditions["pressure_boundary"].items().empty() || !conditions["pressure_cavity"].items().empty()) return false;
   return (!space["discr_order"].exists() || space["discr_order"].json() == 1) && !is_axisymmetric(root) &&
          !remesh["curve"]["enabled"].boolean(false) && !remesh["sizing_field"]["enabled"].boolean(false) &&
@@ -348,7 +348,7 @@ std::map<int, Material> read_materials(const Node& root, const LabelIds& bodies,
   // Quadratic tetrahedra do without: their patches have 65 nodes, which takes several times as long at equal error.
   const Node order = root["space"]["discr_order"];
   const bool is_cheap = Dim == 2 || !order.exists() || order.json() == 1;
-  const bool has_patches = averages_volume(root) && is_cheap && can_carry_patches(root);
+  const bool has_patches = averages_volume(root) && is_cheap && carries_patches(root, Dim);
   const int space = is_axisymmetric(root) ? 3 : Dim;
   std::map<int, Material> materials;
   if (!node.json().is_array()) {  // one for everything, whatever its id
