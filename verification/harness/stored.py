@@ -21,6 +21,7 @@ STORED = {
     "verification/newton/squeeze.csv": ("src/newton", "src/energy", "src/geometry", "verification/newton/bodies.py",
                                         "verification/stability/hard_cases.py"),
     "verification/scaling/results.csv": LINEAR,
+    "verification/scaling/machine.csv": CODE,
     "verification/scaling/million.csv": CODE,
     "verification/scaling/ranks.csv": LINEAR,
     "verification/solvers/results.csv": LINEAR,

@@ -3,7 +3,7 @@
 """What one machine holds: the plate of million.py at 1e4, 1e5 and 1e6 unknowns by a direct engine and by multigrid, on one core and
 on two. Adds rows to machine.csv, and prints them as a table. On idle cores: a quarter of an hour.
 
-/usr/bin/python3 verification/scaling/machine.py [--build build/release] [--work DIR] [--sizes 40 128 410] [--steps 4]
+/usr/bin/python3 verification/scaling/machine.py [--build build/release] [--work DIR] [--sizes 40 128 410] [--solvers auto belos:muelu] [--steps 4]
 """
 import argparse
 import csv
@@ -14,7 +14,7 @@ import million
 
 HERE = pathlib.Path(__file__).resolve().parent
 FILE = HERE / "machine.csv"
-SOLVERS, THREADS = ("auto", "belos:muelu"), (1, 2)
+THREADS = (1, 2)
 
 
 def table():
@@ -35,13 +35,14 @@ def main():
     million.add_arguments(parser)
     parser.set_defaults(steps=4)
     parser.add_argument("--sizes", type=int, nargs="*", default=[40, 128, 410], help="cells along an edge of the plate")
+    parser.add_argument("--solvers", nargs="*", default=["auto", "belos:muelu"])
     parser.add_argument("--table", action="store_true", help="only print what is stored")
     options = parser.parse_args()
     if options.table:
         print(table())
         return 0
     for cells in options.sizes:
-        for solver in SOLVERS:
+        for solver in options.solvers:
             for threads in THREADS:
                 options.cells, options.solver, options.threads = cells, solver, threads
                 row = million.run(options)
