@@ -3,8 +3,8 @@
 #pragma once
 
 #include "itr/frame.hpp"
-#include "simulation/state.hpp"
 #include "itr/setup.hpp"
+#include "simulation/state.hpp"
 
 namespace itr {
 
