@@ -9,7 +9,7 @@ import numpy as np
 from harness import by_default
 from harness.bisection import ball
 from harness.by_default import REMESHED, Study, body, held, merged, obstacle, polyline
-from harness.scenes import box_mesh, write_mesh
+from harness.scenes import box_mesh, write_mesh, wheel_mesh
 
 TITLE = "Forces by defaults"
 QUANTITY = "force, or ratio of forces, of scenes without a numeric key of method; Newton iterations, processor seconds"
@@ -106,14 +106,8 @@ def remeshed(made):
 def wheel(context):
     """A wheel that begins with 12 corners and rolls down a slope: acceleration of its centre."""
     radius, gap, corners, slope, end = 0.05, 5e-5, 12, math.radians(10), 0.8
-    angles = 2 * np.pi * np.arange(corners) / corners
-    ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    points = np.concatenate([np.zeros((1, 2)), radius / 2 * ring, radius * ring]) + [0, radius + gap]
-    inner, outer = 1 + np.arange(corners), 1 + corners + np.arange(corners)
-    cells = [(0, a, b) for a, b in zip(inner, np.roll(inner, -1))]
-    for a, b, c, d in zip(inner, np.roll(inner, -1), outer, np.roll(outer, -1)):
-        cells += [(a, c, d), (a, d, b)]
-    write_mesh(context.folder / "wheel.msh", points, np.array(cells))
+    points, cells = wheel_mesh(radius, corners)
+    write_mesh(context.folder / "wheel.msh", points + [0, radius + gap], cells)
 
     def acceleration(_, folder):
         """From where the centre is in the middle of the time and at its end."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from harness import by_default
-from harness.by_default import LEVELS, REMESHED, Study, body, held, obstacle, refined
+from harness.by_default import REMESHED, Study, body, held, obstacle
 from harness.scenes import oriented, write_mesh
 
 TITLE = "An O-ring by defaults"
@@ -69,7 +69,7 @@ def o_ring_3d(context):
 
 
 def of_revolution(context):
-    """The same ring in a plane through its axis, on finer and finer meshes. A quarter bears a quarter of the force."""
+    """The same ring in a plane through its axis, on finer and finer meshes."""
     points, triangles = section(RADIUS, 2)
     points = np.array(points)
     write_mesh(context.folder / "section.msh", points + [AROUND, 0], oriented(points, triangles))
@@ -80,8 +80,7 @@ def of_revolution(context):
              "time": {"dt": 0.1, "tend": 1, "quasistatic": True},
              "contact": {"enabled": True, "friction_coefficient": 0.3},
              "output": {"forces": [{"name": "force", "obstacles": 12}]}}
-    for level in range(LEVELS + 1):
-        yield f"of revolution refined {level}", refined(scene, level), lambda rows, _: abs(rows[-1]["all_y"]) / 4
+    return by_default.quarters_on_finer_meshes(scene)
 
 
 def results(context):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from harness import by_default
-from harness.by_default import LEVELS, REMESHED, Study, body, held, obstacle, polyline, refined
+from harness.by_default import REMESHED, Study, body, held, obstacle, polyline
 from harness.scenes import box_mesh, oriented, write_mesh
 
 TITLE = "A sphere in rubber by defaults"
@@ -72,7 +72,7 @@ def sphere_in_rubber(context):
 
 
 def of_revolution(context):
-    """Block and sphere in a plane through their axis, on finer and finer meshes. A quarter bears a quarter of the force."""
+    """Block and sphere in a plane through their axis, on finer and finer meshes."""
     write_mesh(context.folder / "plane.msh", *box_mesh([10, 8], [RADIUS, HEIGHT]))
     curve = polyline([(0, -SPHERE), *((r, -z) for r, z in meridian())])
     scene = {"axisymmetric": True, "geometry": [body("plane.msh"), obstacle(context, "curve.obj", *curve, surface_selection=12,
@@ -83,8 +83,7 @@ def of_revolution(context):
              "time": {"dt": 0.25, "tend": 1, "quasistatic": True},
              "contact": {"enabled": True, "friction_coefficient": 0.3},
              "output": {"forces": [{"name": "force", "obstacles": 12}]}}
-    for level in range(LEVELS + 1):
-        yield f"of revolution refined {level}", refined(scene, level), lambda rows, _: abs(rows[-1]["all_y"]) / 4
+    return by_default.quarters_on_finer_meshes(scene)
 
 
 def results(context):

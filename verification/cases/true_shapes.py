@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from harness.bisection import ball
-from harness.scenes import Run, write_mesh
+from harness.scenes import Run, write_mesh, wheel_mesh
 from harness.suite import Result, compare
 
 TITLE = "True shapes"
@@ -41,14 +41,8 @@ def speed_and_area(path):
 
 def wheel(context, steps=300, dt=0.001, corners=12, gap=5e-5):
     """A wheel of rubber on a slope, without slip: mean acceleration by mass over the last two thirds of the run, and area."""
-    angles = 2 * np.pi * np.arange(corners) / corners
-    ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    points = np.concatenate([np.zeros((1, 2)), WHEEL / 2 * ring, WHEEL * ring]) + [0, WHEEL + gap]
-    inner, outer = 1 + np.arange(corners), 1 + corners + np.arange(corners)
-    cells = [(0, a, b) for a, b in zip(inner, np.roll(inner, -1))]
-    for a, b, c, d in zip(inner, np.roll(inner, -1), outer, np.roll(outer, -1)):
-        cells += [(a, c, d), (a, d, b)]
-    write_mesh(context.folder / "wheel.msh", points, np.array(cells))
+    points, cells = wheel_mesh(WHEEL, corners)
+    write_mesh(context.folder / "wheel.msh", points + [0, WHEEL + gap], cells)
     made = run(context, "wheel", {
         "geometry": [{"mesh": "wheel.msh", "surface_selection": 3}, {"type": "ground", "is_obstacle": True}],
         "shapes": [{"surface": 3, "type": "circle", "center": [0, WHEEL + gap], "radius": WHEEL}],

@@ -60,6 +60,12 @@ def refined(scene, levels):
     return scene
 
 
+def quarters_on_finer_meshes(scene):
+    """Runs of a body of revolution in a plane through its axis, of which a quarter bears a quarter of the force."""
+    for level in range(LEVELS + 1):
+        yield f"of revolution refined {level}", refined(scene, level), lambda rows, _: abs(rows[-1]["all_y"]) / 4
+
+
 def materials_of(scene):
     return scene["materials"] if isinstance(scene["materials"], list) else [scene["materials"]]
 

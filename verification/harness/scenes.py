@@ -129,3 +129,15 @@ def run_scene(context, name, content, *overrides):
     if not (folder / "summary.json").exists():
         raise Failure(f"{folder} has no summary.json")
     return Run(folder)
+
+
+def wheel_mesh(radius, corners):
+    """Points and triangles of a regular polygon around the origin, in a ring of triangles and one of quadrilaterals."""
+    angles = 2 * np.pi * np.arange(corners) / corners
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    points = np.concatenate([np.zeros((1, 2)), radius / 2 * ring, radius * ring])
+    inner, outer = 1 + np.arange(corners), 1 + corners + np.arange(corners)
+    cells = [(0, a, b) for a, b in zip(inner, np.roll(inner, -1))]
+    for a, b, c, d in zip(inner, np.roll(inner, -1), outer, np.roll(outer, -1)):
+        cells += [(a, c, d), (a, d, b)]
+    return points, np.array(cells)

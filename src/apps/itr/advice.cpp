@@ -351,12 +351,12 @@ void find_locking(const Setup<Dim>& setup, std::vector<std::string>& found) {
                         name, layers));
       if (keeps_volume && material.poisson_ratio >= kIncompressible)
         found.push_back(fmt::format(
-            "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes most of that away, but forces "
-            "may stay too large by some percent; compare with a quarter of /space/remesh/relative_tolerance, or with {} "
-            "(/materials/*/volume)",
+            "body {}: nu = {:.4g} with linear elements, which lock: remeshing takes a part of that away, but forces may "
+            "stay too large, by a tenth to a third where that was measured; compare with {} (/materials/*/volume)",
             name, material.poisson_ratio,
-            setup.mesh.is_axisymmetric() ? "a fixed mesh, where volumes are averaged over patches"
-                                         : "volumes that are averaged over patches"));
+            setup.mesh.is_axisymmetric() || setup.remesh.curve.enabled
+                ? "a fixed mesh, where volumes are averaged over patches"
+                : "volumes that are averaged over patches"));
     } else if (keeps_volume && material.poisson_ratio >= kIncompressible)
       found.push_back(fmt::format(
           "body {}: nu = {:.4g} with linear elements, about {:.2g} of them through its thickness: they "
