@@ -10,13 +10,15 @@
 
 #include "core/noise.hpp"
 #include "itr/solver.hpp"
+#include "linear/low_rank.hpp"
 
 namespace itr::linear {
 
-/// A x = b, of a lower triangle. It refers to what others own.
+/// (A + U U^T) x = b, A by its lower triangle. It refers to what others own.
 struct SystemView {
   const SparsityPattern& pattern;
   std::span<const double> values, b;
+  const MatrixX* U = nullptr;  ///< null: none
 };
 
 inline double dot(std::span<const double> a, std::span<const double> b) {
@@ -25,9 +27,9 @@ inline double dot(std::span<const double> a, std::span<const double> b) {
   return sum;
 }
 
-/// y = A x.
+/// y = (A + U U^T) x.
 inline void multiply(const SystemView& system, std::span<const double> x, std::span<double> y) {
-  const auto& [pattern, values, b] = system;
+  const auto& [pattern, values, b, U] = system;
   std::ranges::fill(y, 0.0);
   for (int j = 0; j < pattern.order; ++j) {
     const int diagonal = pattern.column_starts[j], end = pattern.column_starts[j + 1];
@@ -39,6 +41,7 @@ inline void multiply(const SystemView& system, std::span<const double> x, std::s
     }
     y[j] += row;
   }
+  if (U) add_low_rank(*U, as_vector(x), as_vector(y));
 }
 
 /// Conjugate gradients with a given preconditioner. The solution is kept, and can be given more digits.

@@ -26,7 +26,9 @@ constexpr double kNoResidual = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-struct ReusingSolver::Iteration : ConjugateGradients {};
+struct ReusingSolver::Iteration : ConjugateGradients {
+  LowRankCorrection correction;  ///< of the factor
+};
 
 /// Seconds, by counts.
 struct ReusingSolver::Costs {
@@ -118,15 +120,16 @@ SolveReport ReusingSolver::solve(std::span<const double> B, std::span<double> X,
 }
 
 SystemReport ReusingSolver::solve_system(std::span<const double> values, std::span<const double> b, const Asked& asked,
-                                         std::span<double> x) {
+                                         std::span<double> x, const MatrixX* U) {
   const ScopedPhase phase("iterate");
   if (!pattern_) return describe(solver_.factorize(values), solver_);  // says what is missing
+  const SystemView system{*pattern_, values, b, U};
   const bool goes_on = asked.goes_on && last_ == Last::iterated;
   if (!goes_on) take_in(values);
   if (goes_on ? iteration_->residual() > asked.loose : last_ != Last::found && may_iterate(values, b))
-    iterate(values, b, asked.loose);
+    iterate(system, asked.loose);
   if (last_ == Last::refused) return {Outcome::not_positive_definite, kNoResidual, Definiteness::indefinite};
-  if (last_ != Last::iterated) return solve_by_factor(values, b, asked, x);
+  if (last_ != Last::iterated) return solve_by_factor(system, asked, x);
   if (!x.empty()) {
     std::ranges::copy(iteration_->solution(), x.begin());
     counts_.solves += !goes_on;
@@ -136,11 +139,21 @@ SystemReport ReusingSolver::solve_system(std::span<const double> values, std::sp
   return {Outcome::ok, residual, residual <= kWholeSystem ? Definiteness::positive : Definiteness::unknown};
 }
 
-SystemReport ReusingSolver::solve_by_factor(std::span<const double> values, std::span<const double> b, const Asked& asked,
-                                            std::span<double> x) {
-  const SystemReport report = describe(last_ == Last::found ? Outcome::ok : factorize_now(values), solver_);
+SystemReport ReusingSolver::solve_by_factor(const SystemView& system, const Asked& asked, std::span<double> x) {
+  const SystemReport report = describe(last_ == Last::found ? Outcome::ok : factorize_now(system.values), solver_);
   if (x.empty()) return report;
-  return with_solution(report, asked, [&] { return solve(b, x, 1, asked.residual); });
+  return with_solution(report, asked, [&]() -> SolveReport {
+    const SolveReport of_A = solve(system.b, x, 1, asked.residual);
+    if (!has_solution(of_A.outcome) || !system.U) return of_A;
+    const bool is_found = iteration_->correction.compute(*system.U, [&](const auto& u, auto&& z) {
+      return has_solution(solver_.solve(as_span(u), as_span(z), 1, asked.residual).outcome);
+    });
+    if (!is_found) return {Outcome::failed, kNoResidual};
+    iteration_->correction.correct(as_vector(x));
+    std::vector<double> product(x.size());
+    multiply(system, x, product);
+    return {of_A.outcome, (as_vector(system.b) - as_vector(std::span(product))).norm() / as_vector(system.b).norm()};
+  });
 }
 
 bool ReusingSolver::precondition(std::span<const double> residual, std::span<double> z) {
@@ -186,12 +199,19 @@ ReusingSolver::Costs ReusingSolver::costs() const {
 
 /// Solves the system by iterations with the factor that is there, or goes on with it. Where they do not get there, `last_`
 /// stays none, or is refused.
-void ReusingSolver::iterate(std::span<const double> values, std::span<const double> b, double asked) {
+void ReusingSolver::iterate(const SystemView& system, double asked) {
   const bool goes_on = std::exchange(last_, Last::none) == Last::iterated;
-  const SystemView system{*pattern_, values, b};
-  const double scale = ConjugateGradients::norm(b), from = goes_on ? iteration_->residual() : 1;
+  const double scale = ConjugateGradients::norm(system.b), from = goes_on ? iteration_->residual() : 1;
   if (!(scale > 0) || !std::isfinite(scale)) return;
-  const auto by_factor = [this](std::span<const double> residual, std::span<double> z) { return precondition(residual, z); };
+  LowRankCorrection& correction = iteration_->correction;
+  const auto by_factor = [&](std::span<const double> residual, std::span<double> z) {
+    if (!precondition(residual, z)) return false;
+    if (system.U) correction.correct(as_vector(z));
+    return true;
+  };
+  if (system.U && !goes_on &&
+      !correction.compute(*system.U, [&](const auto& u, auto&& z) { return precondition(as_span(u), as_span(z)); }))
+    return pause();
   if (!goes_on && !iteration_->begin(system, by_factor)) return pause();
   const Costs cost = costs();
   const auto end = iteration_->run(system, by_factor, asked, cost.most_iterations() - iterations_);

@@ -6,9 +6,12 @@
 #include <memory>
 #include <vector>
 
+#include "itr/types.hpp"
 #include "linear/system.hpp"
 
 namespace itr::linear {
+
+struct SystemView;
 
 /// Matrix that a factor was made of.
 struct FactoredMatrix {
@@ -70,9 +73,10 @@ class ReusingSolver final : public Solver {
   std::string message() const override;
 
   /// Solves A x = b for the matrix of these values: to `asked.residual` by a factor of it, else to `asked.loose` by
-  /// iterations, else factorises it first. If x is empty, only what the matrix is is found out.
+  /// iterations, else factorises it first. If x is empty, only what the matrix is is found out. With U the system is that of
+  /// A + U U^T, of which A is what gets factorised.
   SystemReport solve_system(std::span<const double> values, std::span<const double> b, const Asked& asked,
-                            std::span<double> x);
+                            std::span<double> x, const MatrixX* U = nullptr);
   /// Solves with the factor that is there, whatever matrix of this order it is of. False where there is none.
   bool precondition(std::span<const double> residual, std::span<double> z);
   /// Whether the matrix given last has been factorised.
@@ -101,10 +105,9 @@ class ReusingSolver final : public Solver {
   bool may_iterate(std::span<const double> values, std::span<const double> b);
   Outcome analyze_now();
   Outcome factorize_now(std::span<const double> values);
-  void iterate(std::span<const double> values, std::span<const double> b, double asked);
+  void iterate(const SystemView& system, double asked);
   void pause();
-  SystemReport solve_by_factor(std::span<const double> values, std::span<const double> b, const Asked& asked,
-                               std::span<double> x);
+  SystemReport solve_by_factor(const SystemView& system, const Asked& asked, std::span<double> x);
   Costs costs() const;
 
   Solver& solver_;

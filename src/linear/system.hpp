@@ -18,6 +18,9 @@ struct SystemReport {
   int negative_eigenvalues = 0;  ///< of an indefinite matrix; 0 where they were not counted
 };
 
+/// One with too few digits is one, too.
+inline bool has_solution(Outcome outcome) { return outcome == Outcome::ok || outcome == Outcome::not_converged; }
+
 /// Accuracy that the caller asks for.
 struct Asked {
   double residual = 0;         ///< relative

@@ -45,6 +45,9 @@ class NewtonSystem {
   /// only what the matrix is is found out.
   virtual linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                                      VectorView solution);
+  /// The same with Hessian + shift + U U^T, U of a few columns, which is never assembled.
+  virtual linear::SystemReport solve_beside(const MatrixX& U, const Shift& shift, ConstVectorView rhs,
+                                            const linear::Asked& asked, VectorView solution);
   /// Factorises Hessian + shift.
   virtual linear::SystemReport factorize(const Shift& shift) = 0;
   /// Solves with the matrix that was given last.
@@ -97,6 +100,8 @@ class SparseSystem final : public NewtonSystem {
   void assemble(const Energy&, ConstVectorView x, PsdProjection, const DofMap&, PrescribedMotion&, Workspace&) override;
   linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                              VectorView solution) override;
+  linear::SystemReport solve_beside(const MatrixX& U, const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                                    VectorView solution) override;
   linear::SystemReport factorize(const Shift& shift) override;
   linear::SolveReport solve_again(ConstVectorView rhs, VectorView solution) override;
   bool solve_columns(const MatrixX& B, MatrixX& X) override;
@@ -108,6 +113,8 @@ class SparseSystem final : public NewtonSystem {
   double curvature_of(const Shift& shift, ConstVectorView step) const override;
 
  private:
+  linear::SystemReport solve_with(const MatrixX* U, const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
+                                  VectorView solution);
   linear::Outcome analyze();
   void shift_by(const Shift& shift);
   bool has_factor();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "linear/low_rank.hpp"
 #include "newton/newton.hpp"
 
 namespace itr {
@@ -13,6 +14,18 @@ linear::SystemReport NewtonSystem::solve(const Shift& shift, ConstVectorView rhs
   const linear::SystemReport report = factorize(shift);
   if (solution.size() == 0) return report;
   return linear::with_solution(report, asked, [&] { return solve_again(rhs, solution); });
+}
+
+linear::SystemReport NewtonSystem::solve_beside(const MatrixX& U, const Shift& shift, ConstVectorView rhs,
+                                                const linear::Asked& asked, VectorView solution) {
+  linear::SystemReport report = solve(shift, rhs, asked, solution);
+  if (solution.size() == 0 || !linear::has_solution(report.outcome)) return report;
+  linear::LowRankCorrection correction;
+  MatrixX Z;
+  if (!solve_columns(U, Z)) return {linear::Outcome::failed};
+  correction.set_columns(U, std::move(Z));
+  correction.correct(solution);
+  return report;
 }
 
 bool NewtonSystem::solve_columns(const MatrixX& B, MatrixX& X) {
@@ -127,11 +140,20 @@ linear::SystemReport SparseSystem::factorize(const Shift& shift) {
 
 linear::SystemReport SparseSystem::solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                                          VectorView solution) {
-  if (!reusing_) return NewtonSystem::solve(shift, rhs, asked, solution);
+  return reusing_ ? solve_with(nullptr, shift, rhs, asked, solution) : NewtonSystem::solve(shift, rhs, asked, solution);
+}
+
+linear::SystemReport SparseSystem::solve_beside(const MatrixX& U, const Shift& shift, ConstVectorView rhs,
+                                                const linear::Asked& asked, VectorView solution) {
+  return reusing_ ? solve_with(&U, shift, rhs, asked, solution) : NewtonSystem::solve_beside(U, shift, rhs, asked, solution);
+}
+
+linear::SystemReport SparseSystem::solve_with(const MatrixX* U, const Shift& shift, ConstVectorView rhs,
+                                              const linear::Asked& asked, VectorView solution) {
   if (const auto outcome = analyze(); outcome != linear::Outcome::ok) return {.outcome = outcome};
   shift_by(shift);
   return reusing_->solve_system(matrix_, {rhs.data(), static_cast<std::size_t>(rhs.size())}, asked,
-                                {solution.data(), static_cast<std::size_t>(solution.size())});
+                                {solution.data(), static_cast<std::size_t>(solution.size())}, U);
 }
 
 /// Iterations may have solved the system of the matrix given last without a factor of it.
