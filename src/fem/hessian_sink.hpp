@@ -154,6 +154,8 @@ class HessianTarget {
   void add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
                     std::span<const double> factors, std::span<const double> block, const Fill& fill);
   template <int Dim>
+  bool is_moved(std::span<const int> nodes) const;
+  template <int Dim>
   void add_motion(std::span<const int> vertices, const double* block);
 
   const DofMap* dofs_ = nullptr;  ///< null where there is a receiver
@@ -290,10 +292,10 @@ void HessianTarget::add_blocks(ElementKind kind, std::span<const Element> elemen
     if (is_base && !motion_) continue;
     for (std::size_t i = 0; i < count; ++i) {
       const auto& nodes = ids_of(elements[first + i]);
-      if (is_base)
-        add_motion<Dim>(nodes, blocks[i].data());
-      else
+      if (!is_base)
         add<Dim>(nodes, blocks[i].data());
+      else if (is_moved<Dim>(nodes))
+        add_motion<Dim>(nodes, blocks[i].data());
     }
   }
 }
@@ -301,11 +303,32 @@ void HessianTarget::add_blocks(ElementKind kind, std::span<const Element> elemen
 template <int Dim, typename Element, typename NodesOf, typename Fill>
 void HessianTarget::add_constant(ElementKind kind, std::span<const Element> elements, const NodesOf& ids_of,
                                  std::span<const double> factors, std::span<const double> block, const Fill& fill) {
-  if (!sparse_ || motion_) return add_blocks<Dim>(kind, elements, ids_of, fill);
-  if (sparse_->add_cached(kind, factors, block)) return;
-  sparse_->begin_keeping();
-  add_blocks<Dim>(kind, elements, ids_of, fill);
-  sparse_->end_keeping(kind, factors, block);
+  if (!sparse_ || sparse_->num_stencils(kind) != elements.size()) return add_blocks<Dim>(kind, elements, ids_of, fill);
+  PrescribedMotion* const motion = std::exchange(motion_, nullptr);
+  if (!sparse_->add_cached(kind, factors, block)) {
+    sparse_->begin_keeping();
+    add_blocks<Dim>(kind, elements, ids_of, fill);
+    sparse_->end_keeping(kind, factors, block);
+  }
+  motion_ = motion;
+  if (!motion) return;
+  constexpr int kNodes = static_cast<int>(std::tuple_size_v<std::decay_t<decltype(ids_of(elements[0]))>>);
+  Mat<Dim * kNodes> of_element;
+  for (std::size_t e = 0; e < elements.size(); ++e) {
+    const auto& nodes = ids_of(elements[e]);
+    if (!is_moved<Dim>(nodes)) continue;
+    fill(e, of_element);
+    add_motion<Dim>(nodes, of_element.data());
+  }
+}
+
+/// Whether held dofs of these nodes take a step: others have no part in the coupling.
+template <int Dim>
+bool HessianTarget::is_moved(std::span<const int> nodes) const {
+  for (const int v : nodes)
+    for (int i = Dim * v; i < Dim * (v + 1); ++i)
+      if (dofs_->unknown[i] == kNone && motion_->step[i] != 0) return true;
+  return false;
 }
 
 }  // namespace itr
