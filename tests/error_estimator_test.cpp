@@ -5,6 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include "energy/contact/retraction.hpp"
 #include "itr/simulation.hpp"
 #include "itr/solver.hpp"
@@ -17,7 +21,7 @@ namespace {
 
 constexpr double kSize = 0.2;
 constexpr int kMesh = static_cast<int>(ErrorSource::mesh), kDhat = static_cast<int>(ErrorSource::dhat),
-              kSolver = static_cast<int>(ErrorSource::solver);
+              kSolver = static_cast<int>(ErrorSource::solver), kTime = static_cast<int>(ErrorSource::time);
 
 /// A square held on the left and moved on the right, without inertia.
 itr::Setup<2> pulled(MaterialLaw law, const Vec<2>& motion) {
@@ -251,6 +255,113 @@ TEST(ErrorEstimator, ChangesNoResult) {
     EXPECT_FALSE(without.errors.is_asked);
     EXPECT_TRUE(without.curve.errors.empty());
   }
+}
+
+/// A corner's displacements and a reaction at multiples of a time, with the estimates of what steps put them off by.
+struct Motion {
+  std::vector<Vec<2>> points, forces, error_of_points, error_of_forces;
+};
+
+constexpr double kStep = 0.005;  ///< [s]; the slowest period of a square on a wall has about 100
+
+/// A square on a wall that is shaken.
+itr::Setup<2> shaken(Integrator integrator) {
+  itr::Setup<2> setup = pulled(MaterialLaw::neo_hookean, Vec<2>(0, 0));
+  setup.dirichlet.resize(1);
+  setup.dirichlet[0].displacement = [](const Vec<2>&, double t) { return Vec<2>(0, 0.02 * std::pow(std::sin(3 * t), 4)); };
+  setup.time = {.integrator = integrator, .dt = kStep};
+  setup.fields.curves = {{.name = "wall", .surfaces = {1}}};
+  return setup;
+}
+
+/// Its motion in `parts` steps for each of `rows` times.
+Motion swing(Integrator integrator, int rows, int parts, bool with_bars) {
+  itr::Setup<2> setup = shaken(integrator);
+  setup.time.dt /= parts;
+  setup.time.steps = rows * parts;
+  setup.fields.error_bars = with_bars;
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  Motion motion;
+  for (int step = 1; step <= rows * parts; ++step) {
+    const StepResult result = simulation.advance();
+    EXPECT_TRUE(result.ok) << result.reason;
+    if (step % parts != 0) continue;
+    simulation.observe([&](const FrameView<2>& frame) {
+      const ForceCurvePoint& curve = frame.asked->curves.at(0);
+      const PointValue& point = frame.asked->points.at(0);
+      motion.points.emplace_back(point.u.data());
+      motion.forces.emplace_back(curve.kinds[3].data());
+      if (!with_bars) return;
+      motion.error_of_points.emplace_back(point.errors.at(kTime).data());
+      motion.error_of_forces.emplace_back(curve.errors.at(kTime)[3].data());
+    });
+  }
+  return motion;
+}
+
+struct TimeSteps : ::testing::TestWithParam<Integrator> {};
+INSTANTIATE_TEST_SUITE_P(ErrorEstimator, TimeSteps,
+                         ::testing::Values(Integrator::implicit_euler, Integrator::bdf, Integrator::newmark));
+
+/// Norms of errors and of what estimates are off by, where these are known, and how often they are.
+struct Judged {
+  double error = 0, off = 0, known = 0;
+};
+Judged judge(const std::vector<Vec<2>>& exact, const std::vector<Vec<2>>& found, const std::vector<Vec<2>>& estimate) {
+  Judged judged;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    if (!estimate[i].allFinite()) continue;
+    judged.error += (exact[i] - found[i]).squaredNorm();
+    judged.off += (exact[i] - found[i] - estimate[i]).squaredNorm();
+    judged.known += 1.0 / static_cast<double>(exact.size());
+  }
+  return {std::sqrt(judged.error), std::sqrt(judged.off), judged.known};
+}
+
+/// Against a twentieth of the step: over one period and over four, in which errors of the steps add up.
+TEST_P(TimeSteps, HaveTheErrorThatShorterOnesTakeAway) {
+  constexpr double kPart = 0.35;  // of the error, that the estimate may be off by
+  for (const int rows : {100, 400}) {
+    const Motion steps = swing(GetParam(), rows, 1, true), exact = swing(GetParam(), rows, 20, false);
+    const Judged points = judge(exact.points, steps.points, steps.error_of_points);
+    const Judged forces = judge(exact.forces, steps.forces, steps.error_of_forces);
+    EXPECT_GE(points.known, 0.7) << rows;
+    EXPECT_LE(points.off, kPart * points.error) << rows;
+    EXPECT_GE(forces.known, 0.3) << rows;
+    EXPECT_LE(forces.off, kPart * forces.error) << rows;
+  }
+}
+
+TEST(ErrorEstimator, KnowsNoErrorInTimeAfterAnImpact) {
+  for (const double gap : {1.0, 0.012}) {  // the second one closes
+    itr::Setup<2> setup = shaken(Integrator::bdf);
+    setup.time.steps = 100;
+    setup.obstacles.rest = {{0.12, kSize + gap}, {0.3, kSize + gap}};
+    setup.obstacles.edges = {{0, 1}};
+    setup.obstacles.motion = {0, 0};
+    setup.obstacles.motions = {[](const Vec<2>&, double) { return Vec<2>(0, 0); }};
+    setup.contact = {.enabled = true, .dhat = 1e-3, .convergent = true, .barrier_stiffness = 1e4};
+    linear::Registry registry;
+    Simulation<2> simulation(setup, registry);
+    std::vector<bool> is_known;
+    for (int step = 1; step <= setup.time.steps; ++step) {
+      const StepResult result = simulation.advance();
+      ASSERT_TRUE(result.ok) << result.reason;
+      simulation.observe([&](const FrameView<2>& frame) {
+        is_known.push_back(std::isfinite(frame.asked->points.at(0).errors.at(kTime)[0]));
+      });
+    }
+    EXPECT_TRUE(is_known.at(setup.time.steps / 4)) << gap;
+    EXPECT_EQ(is_known.back(), gap == 1) << gap;
+  }
+}
+
+TEST(ErrorEstimator, KnowsNoErrorOfIncrementsWithFriction) {
+  itr::Setup<2> setup = pressed(4e-4);
+  EXPECT_EQ(run(setup).errors.energy[kTime], 0);
+  setup.contact.friction_coefficient = 0.3;
+  EXPECT_TRUE(std::isnan(run(setup).errors.energy[kTime]));
 }
 
 }  // namespace

@@ -98,9 +98,10 @@ enum class ErrorSource {
   dhat,      ///< contact acts from a distance
   friction,  ///< friction is smoothed below a velocity
   lag,       ///< friction and others are those of an iterate before
-  solver     ///< iterations ended
+  solver,    ///< iterations ended
+  time       ///< steps are too long; not a number where that is not known
 };
-inline constexpr int kErrorSources = 5;
+inline constexpr int kErrorSources = 6;
 /// As in files.
 ITR_EXPORT std::string_view name(ErrorSource source);
 

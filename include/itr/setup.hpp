@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <map>
@@ -194,6 +195,11 @@ struct ITR_EXPORT StepSetup {
   /// Called after each Newton iteration on the whole mesh. Returning false cancels the step.
   std::function<bool(const NewtonProgress&)> on_iteration;
 
+  /// Whether solutions without inertia depend on the steps that led to them.
+  bool depends_on_path() const {
+    return contact.has_friction() || contact.adhesion.tangential_coefficient > 0 || !damping.empty() || !fluids.empty() ||
+           std::ranges::any_of(materials, [](const auto& entry) { return has_memory(entry.second); });
+  }
   /// Throws InputError for the first value that is out of range, missing or not finite. Its place is the JSON pointer of a
   /// scene if there is one.
   void validate() const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -205,6 +206,10 @@ std::vector<Mat<Dim>> inverse_blocks(const FinerSpace<Dim>& space, const DofMap&
   return blocks;
 }
 
+void make_unknown(std::initializer_list<VectorX*> fields) {
+  for (VectorX* field : fields) field->setConstant(std::numeric_limits<double>::quiet_NaN());
+}
+
 /// Why errors of such a step cannot be estimated; empty: they can.
 template <int Dim>
 std::string why_unknown(const StepSetup<Dim>& setup, const Mesh<Dim>& mesh) {
@@ -337,17 +342,6 @@ NodalForces forces_of(const typename StepProblem<Dim>::Gradients& change, const 
   return forces;
 }
 
-History difference(const History& a, const History& b) {
-  History result = a;
-  const auto subtract = [](std::vector<VectorX>& from, const std::vector<VectorX>& what) {
-    for (std::size_t i = 0; i < from.size(); ++i) from[i] -= what[i];
-  };
-  subtract(result.x, b.x);
-  subtract(result.v, b.v);
-  subtract(result.a, b.a);
-  return result;
-}
-
 }  // namespace
 
 template <int Dim>
@@ -396,17 +390,7 @@ bool ErrorEstimator<Dim>::try_factors(StepProblem<Dim>& problem, const VectorX& 
 /// The history before the step in the finer space, with the errors that earlier steps have left in it.
 template <int Dim>
 History ErrorEstimator<Dim>::finer_history(const State<Dim>& state) const {
-  History history = space_->prolong(state.history);
-  if (carried_.positions.size() == 0 || carried_.revision != space_->revision || carried_.positions != state.history.x[0] ||
-      carried_.errors.x.size() != history.x.size())
-    return history;
-  const auto add = [](std::vector<VectorX>& to, const std::vector<VectorX>& what) {
-    for (std::size_t i = 0; i < to.size(); ++i) to[i] += what[i];
-  };
-  add(history.x, carried_.errors.x);
-  add(history.v, carried_.errors.v);
-  add(history.a, carried_.errors.a);
-  return history;
+  return carried_.added_to(space_->prolong(state.history), state.history, space_->revision);
 }
 
 /// Keeps the errors that the step leaves to the next: `motion` those of its positions.
@@ -482,34 +466,50 @@ bool ErrorEstimator<Dim>::estimate_mesh(const StepSetup<Dim>& setup, const State
   return true;
 }
 
-/// Estimates the errors by other sources on the mesh itself.
+/// Estimates the errors by a source on the mesh itself.
 template <int Dim>
-bool ErrorEstimator<Dim>::estimate_others(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem,
-                                          const VectorX& x, const std::array<Change, kErrorSources>& changes,
-                                          ErrorReport& report, ErrorFields& errors) {
-  NewtonSystem::Product product;
-  const auto hessian = [&](ConstVectorView v, VectorView Hv) {
-    if (!product) product = problem.assemble(x, PsdProjection::none).product();
-    product(v, Hv);
-  };
+bool ErrorEstimator<Dim>::estimate_other(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem,
+                                         const VectorX& x, const Change& change, const NewtonSystem::Product& hessian,
+                                         std::string& no_bar, double& energy, ErrorFields::OfSource& fields) {
   const double nothing = kNothing * std::abs(problem.sum().value(x, problem.workspace()));
-  for (std::size_t s = 1; s < changes.size(); ++s) {
-    const Change& change = changes[s];
-    Response response{VectorX::Zero(x.size())};
+  Response response{VectorX::Zero(x.size())};
+  const auto solve = [&] {
+    const auto by_factor = [&](const VectorX& residual) { return precondition(residual); };
+    return minimise(problem.dofs(), hessian, by_factor, change.all, nothing, kEnoughInContact, 0, response);
+  };
+  if (!change.all.isZero(0) && !try_factors(problem, x, no_bar, solve)) return false;
+  // Where a source changes the energy itself, that is of first order, and the gain of second.
+  energy = (change.energy != 0 ? change.energy : -response.gain) / problem.scaling();
+  fields.displacement = response.motion;
+  if (setup.fields.any_forces())
+    fields.forces = forces_of<Dim>(with_motion<Dim>(change, problem, x, response.motion), problem,
+                                   Eigen::Index{Dim} * state.mesh.num_nodes());
+  return true;
+}
+
+/// Estimates what steps have put the solution off by; NaN where that is not known.
+template <int Dim>
+void ErrorEstimator<Dim>::estimate_time(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem,
+                                        const VectorX& x, Change& change, const NewtonSystem::Product& hessian,
+                                        double& energy, ErrorFields::OfSource& fields) {
+  std::string no_bar;
+  const auto filter = [&](const VectorX& momentum) -> VectorX {
+    Response response;
     const auto solve = [&] {
       const auto by_factor = [&](const VectorX& residual) { return precondition(residual); };
-      return minimise(problem.dofs(), hessian, by_factor, change.all, nothing, kEnoughInContact, 0, response);
+      return minimise(problem.dofs(), hessian, by_factor, -momentum, 0, kEnough, 0, response);
     };
-    if (!change.all.isZero(0) && !try_factors(problem, x, report.no_bar, solve)) return false;
-    // Where a source changes the energy itself, that is of first order, and the gain of second.
-    report.energy[s] = (change.energy != 0 ? change.energy : -response.gain) / problem.scaling();
-    ErrorFields::OfSource& fields = errors.sources[s];
-    fields.displacement = response.motion;
-    if (setup.fields.any_forces())
-      fields.forces = forces_of<Dim>(with_motion<Dim>(change, problem, x, response.motion), problem,
-                                     Eigen::Index{Dim} * state.mesh.num_nodes());
-  }
-  return true;
+    return try_factors(problem, x, no_bar, solve) ? response.motion : VectorX();
+  };
+  time_bars_.find(setup, state, problem, x, filter, change);
+  if (!estimate_other(setup, state, problem, x, change, hessian, no_bar, energy, fields)) time_bars_.lose();
+  time_bars_.keep(setup, state, problem, x, fields.displacement);
+  if (!time_bars_.knows_displacements()) make_unknown({&fields.displacement});
+  if (time_bars_.knows_forces()) return;
+  NodalForces& forces = fields.forces;
+  make_unknown({&forces.contact, &forces.friction, &forces.applied, &forces.obstacle_contact, &forces.obstacle_friction,
+                &forces.body, &forces.residual, &forces.reaction});
+  energy = std::numeric_limits<double>::quiet_NaN();
 }
 
 template <int Dim>
@@ -529,9 +529,19 @@ ErrorFields ErrorEstimator<Dim>::estimate(const StepSetup<Dim>& setup, const Sta
   const auto as_solved = problem.gradients(x);
   problem.lag_as(problem, x);
   const auto at_x = problem.gradients(x);
-  const auto changes = find_changes(setup, problem, x, as_solved, at_x);
-  if (!estimate_mesh(setup, state, problem, x, at_x, report, errors.sources[0]) ||
-      !estimate_others(setup, state, problem, x, changes, report, errors)) {
+  auto changes = find_changes(setup, problem, x, as_solved, at_x);
+  NewtonSystem::Product product;
+  const auto hessian = [&](ConstVectorView v, VectorView Hv) {
+    if (!product) product = problem.assemble(x, PsdProjection::none).product();
+    product(v, Hv);
+  };
+  constexpr auto kTime = static_cast<std::size_t>(ErrorSource::time);
+  estimate_time(setup, state, problem, x, changes[kTime], hessian, report.energy[kTime], errors.sources[kTime]);
+  bool are_known = estimate_mesh(setup, state, problem, x, at_x, report, errors.sources[0]);
+  for (std::size_t s = 1; s < kTime && are_known; ++s)
+    are_known =
+        estimate_other(setup, state, problem, x, changes[s], hessian, report.no_bar, report.energy[s], errors.sources[s]);
+  if (!are_known) {
     report.energy = {};
     return {};
   }

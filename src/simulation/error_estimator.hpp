@@ -12,8 +12,11 @@
 #include "itr/frame.hpp"
 #include "itr/setup.hpp"
 #include "linear/reuse.hpp"
+#include "simulation/carried_errors.hpp"
+#include "simulation/error_change.hpp"
 #include "simulation/state.hpp"
 #include "simulation/step_problem.hpp"
+#include "simulation/time_bars.hpp"
 
 namespace itr {
 
@@ -46,12 +49,6 @@ struct FinerSpace {
   typename VertexMap<Dim>::Weights find_weights(const Mesh<Dim>& coarse);
 };
 
-/// Change of gradients and energy at a solution by a source of errors, scaled.
-struct SourceChange {
-  VectorX all, contact, friction;
-  double energy = 0;
-};
-
 /// Estimates errors of energy, forces and displacements at the end of steps. Keeps what depends on the mesh alone, and
 /// errors that the last step has left to the next.
 template <int Dim>
@@ -75,18 +72,18 @@ class ErrorEstimator {
   void carry(const StepSetup<Dim>& setup, const State<Dim>& state, History history, const VectorX& x, const VectorX& motion);
   bool estimate_mesh(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem, const VectorX& x,
                      const Gradients& at_x, ErrorReport& report, ErrorFields::OfSource& fields);
-  bool estimate_others(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem, const VectorX& x,
-                       const std::array<SourceChange, kErrorSources>& changes, ErrorReport& report, ErrorFields& errors);
+  bool estimate_other(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem, const VectorX& x,
+                      const SourceChange& change, const NewtonSystem::Product& hessian, std::string& no_bar, double& energy,
+                      ErrorFields::OfSource& fields);
+  void estimate_time(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem, const VectorX& x,
+                     SourceChange& change, const NewtonSystem::Product& hessian, double& energy,
+                     ErrorFields::OfSource& fields);
 
   linear::ReusingSolver& solver_;
   std::unique_ptr<FinerSpace<Dim>> space_;
   ProblemCache<Dim> cache_;  ///< of the finer space; nothing is solved by it
-  /// Errors that the step to these positions, on the mesh of this revision, has left to the next.
-  struct Carried {
-    std::uint64_t revision = 0;
-    VectorX positions;
-    History errors;
-  } carried_;
+  CarriedErrors carried_;    ///< of the finer space
+  TimeBars<Dim> time_bars_;
 };
 
 extern template class ErrorEstimator<2>;

@@ -21,7 +21,7 @@ void add_changes(const std::vector<MomentumChange>& changes, double factor, std:
 }
 
 std::string_view name(ErrorSource source) {
-  constexpr std::array<std::string_view, kErrorSources> kNames{"mesh", "dhat", "friction", "lag", "solver"};
+  constexpr std::array<std::string_view, kErrorSources> kNames{"mesh", "dhat", "friction", "lag", "solver", "time"};
   return kNames[static_cast<std::size_t>(source)];
 }
 

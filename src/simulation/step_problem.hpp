@@ -106,6 +106,10 @@ class StepProblem {
   double mechanical_energy(const VectorX& x, const VectorX& v);
   /// The errors of the step to x that the last solve found; `has_system`: in iterations, so that its system is about x's.
   TimeErrors time_errors(const History& history, const VectorX& x, bool has_system);
+  /// Finds the impact of the step to x. Returns, by dof, how contact acts at its end and at the states before, of which only
+  /// where it is zero matters; empty without contact.
+  VectorX contact_in_step(const History& history, const VectorX& x, TimeErrors& errors);
+  VectorX momentum(const VectorX& v) const;  ///< M v
   /// Elastic energies that differ by less are the same to round-off, whatever their values [J].
   double energy_resolution() const;
 
@@ -159,7 +163,6 @@ class StepProblem {
   SparseSystem& system();
   /// Adds what is never assembled to it.
   NewtonSystem& newton_system();
-  VectorX momentum(const VectorX& v) const;
   double average_mass() const;
   /// Finds rigid bodies with forces or moments, and makes the loads of one, lagged at x.
   std::vector<int> loaded_rigid_bodies() const;

@@ -84,6 +84,17 @@ void StepProblem<Dim>::find_impact(const History& history, const VectorX& x, con
 }
 
 template <int Dim>
+VectorX StepProblem<Dim>::contact_in_step(const History& history, const VectorX& x, TimeErrors& errors) {
+  if (!potential_.contact()) return {};
+  const VectorX v = TimeIntegrator(setup_.time).velocity_after(increment_of(x), history);
+  const VectorX now = contact_gradient(x), before = contact_gradient(history.x[0]);
+  find_impact(history, x, v, before, now, errors);
+  VectorX acted_on = now.cwiseAbs() + before.cwiseAbs();
+  for (std::size_t age = 1; age < history.x.size(); ++age) acted_on += contact_gradient(history.x[age]).cwiseAbs();
+  return acted_on;
+}
+
+template <int Dim>
 TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& x, bool has_system) {
   TimeErrors errors;
   const VectorX increment = increment_of(x), v = TimeIntegrator(setup_.time).velocity_after(increment, history);
@@ -95,15 +106,8 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
     PrescribedMotion none;
     newton_system().assemble(potential_.sum(lagged_), x, PsdProjection::clamp, dofs_, none, workspace_);
   }
-  if (!terms_.has_inertia || !potential_.contact()) {
-    find_local_error(history, increment, {}, errors);
-    return errors;
-  }
-  const VectorX now = contact_gradient(x), before = contact_gradient(history.x[0]);
-  VectorX acted_on = now.cwiseAbs() + before.cwiseAbs();
-  for (std::size_t age = 1; age < history.x.size(); ++age) acted_on += contact_gradient(history.x[age]).cwiseAbs();
+  const VectorX acted_on = terms_.has_inertia ? contact_in_step(history, x, errors) : VectorX();
   find_local_error(history, increment, acted_on, errors);
-  find_impact(history, x, v, before, now, errors);
   return errors;
 }
 
@@ -111,6 +115,7 @@ TimeErrors StepProblem<Dim>::time_errors(const History& history, const VectorX& 
   template void StepProblem<Dim>::find_local_error(const History&, const VectorX&, const VectorX&, TimeErrors&); \
   template void StepProblem<Dim>::find_impact(const History&, const VectorX&, const VectorX&, const VectorX&,    \
                                               const VectorX&, TimeErrors&);                                      \
+  template VectorX StepProblem<Dim>::contact_in_step(const History&, const VectorX&, TimeErrors&);               \
   template TimeErrors StepProblem<Dim>::time_errors(const History&, const VectorX&, bool);
 ITR_BOTH_DIMENSIONS(ITR_INSTANTIATE)
 

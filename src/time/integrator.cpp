@@ -150,6 +150,29 @@ LocalError TimeIntegrator::local_error(const VectorX& increment, const History& 
   return error;
 }
 
+bool TimeIntegrator::knows_local_error(const History& history) const {
+  return options_.has_inertia() && accuracy(history) <= 2 &&
+         (!is_newmark(history) || (options_.newmark_beta == 0.25 && options_.newmark_gamma == 0.5));
+}
+
+VectorX TimeIntegrator::predictor_error(const LocalError& error, const History& history) const {
+  if (is_newmark(history) || error.v.size() == 0) return -error.x;
+  return -error.x - error.v / velocity_rate(history);
+}
+
+void TimeIntegrator::push_errors(const VectorX& of_x, const LocalError& error, History& errors) const {
+  const History before = errors;
+  push(of_x, errors);
+  errors.v[0] += velocity_rate(before) * error.x;
+  if (!errors.a.empty()) errors.a[0] += error.x / scaling(before);
+  if (error.v.size() == 0) return;
+  if (is_newmark(before)) {
+    errors.v[0] -= error.v;
+  } else if (!errors.a.empty()) {
+    errors.a[0] += velocity_rate(before) * error.v;
+  }
+}
+
 void TimeIntegrator::push(VectorX x, const VectorX& increment, History& history) const {
   VectorX v = velocity_after(increment, history);
   VectorX a = acceleration_depth() > 0 ? acceleration(v, history) : VectorX();

@@ -74,6 +74,13 @@ class TimeIntegrator {
   LocalError local_error(const VectorX& increment, const History& history) const;
   /// C of the local error C h^(p+1) d^(p+1)x/dt^(p+1), where p is `accuracy`.
   double error_constant(const History& history) const;
+  /// Whether local_error knows it: not of BDF from order 3 on, nor of Newmark with damping.
+  bool knows_local_error(const History& history) const;
+  /// What a step's local error adds to x-hat: exact motions fulfil the formulas of the step up to minus its local error.
+  VectorX predictor_error(const LocalError& error, const History& history) const;
+  /// Makes errors of past states, which are linear in each other as these are, those after a step with an error of its own:
+  /// `of_x` are those of the new positions.
+  void push_errors(const VectorX& of_x, const LocalError& error, History& errors) const;
   /// Makes x the newest state; `increment` is x minus the newest positions, before it was rounded.
   void push(VectorX x, const VectorX& increment, History& history) const;
   void push(const VectorX& x, History& history) const { push(x, x - history.x[0], history); }

@@ -68,7 +68,7 @@ void AccuracyWatch::go_on(const std::string& steps, const Units& units) {
     const Json bars = step.value("bars", Json::object());
     report.errors.is_asked = !bars.empty();
     report.errors.no_bar = bars.value("no_bar", "");
-    for (int s = 0; s < kErrorSources && bars.contains("energy"); ++s)
+    for (int s = 0; s < kTime && bars.contains("energy"); ++s)
       report.errors.energy[s] = joules(bars["energy"], name(static_cast<ErrorSource>(s)));
     if (const double split = joules(step, "split_tolerance"); asked_.follows_bars && split > 0 && stored > 0)
       halvings_ = static_cast<int>(std::lround(std::log2(first_tolerance_ * kStoredFraction * stored / split)));
@@ -117,11 +117,12 @@ void AccuracyWatch::add(const StepReport& report, double energy) {
   energy_ = std::max(energy_, energy);
   Parts parts{};
   double sum = 0, worst = 0;
-  for (int s = 0; s < kErrorSources; ++s) {
+  for (int s = 0; s < kTime; ++s) {
     parts[s] = std::abs(report.errors.energy[s]);
     sum += parts[s];
     worst += worst_[s];
   }
+  parts[kTime] = std::abs(report.errors.energy[kTime]);
   if (report.errors.is_asked && report.errors.no_bar.empty() && sum <= kUnresolved * energy) {
     if (sum > worst) worst_ = parts;
     return;
@@ -170,18 +171,18 @@ std::string AccuracyWatch::describe(const std::string& forces, const std::string
     return fmt::format("accuracy of the energy: {:.3g} % asked; no bar in any step: {}", 100 * asked_.value,
                        no_bar_.empty() ? "none was taken" : no_bar_);
   }
-  parts[kTime] = time_error();
+  const bool has_time = time_.adaptive.enabled || time_.is_static || std::isfinite(parts[kTime]);
+  if (time_.adaptive.enabled || !has_time) parts[kTime] = time_error();
   double sum = 0;
   std::string list;
   for (int s = 0; s <= kTime; ++s) {
     sum += parts[s];
     if (parts[s] > 0)
-      list += fmt::format("{}{} {:.2g}", list.empty() ? "" : ", ", s == kTime ? "time" : name(static_cast<ErrorSource>(s)),
-                          100 * parts[s]);
+      list += fmt::format("{}{} {:.2g}", list.empty() ? "" : ", ", name(static_cast<ErrorSource>(s)), 100 * parts[s]);
   }
   std::string text = fmt::format("accuracy of {}: {:.3g} % asked, {:.2g} % estimated ({})",
                                  asked_.of == "energy" ? "the energy" : asked_.of, 100 * asked_.value, 100 * sum, list);
-  if (!time_.is_static && !time_.adaptive.enabled) text += ", without the error of the steps, as the scene sets /time/dt";
+  if (!has_time) text += ", without the error of the steps, as the scene sets /time/dt";
   if (is_resumed_ && time_.has_inertia()) text += ", of the steps since it was resumed";
   if (steps_without_bar_ > 0) text += fmt::format(", no bar in {} of {} steps: {}", steps_without_bar_, steps_, no_bar_);
   if (sum <= asked_.value) return text + ": reached";

@@ -33,8 +33,8 @@ class AccuracyWatch {
   std::string describe(const std::string& forces, const std::string& points) const;
 
  private:
-  static constexpr int kTime = kErrorSources;  ///< after the sources of bars
-  using Parts = std::array<double, kErrorSources + 1>;
+  static constexpr int kTime = static_cast<int>(ErrorSource::time);  ///< the last source
+  using Parts = std::array<double, kErrorSources>;
 
   bool is_steered(double energy, bool is_last) const;
   double mesh_error(const StepReport& report, double energy) const;

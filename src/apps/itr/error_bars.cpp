@@ -16,6 +16,7 @@ namespace {
 
 /// Estimated errors by source, in a result's own unit.
 using BySource = std::array<double, kErrorSources>;
+constexpr int kTime = static_cast<int>(ErrorSource::time);  ///< the last one
 
 struct Peak {
   std::string step;
@@ -65,10 +66,14 @@ std::map<std::string, Peak> find_peaks(const std::string& rows, const std::strin
 }
 
 /// "1.6 % (mesh 0.9, dhat 0.4): refine the mesh first", of a value of this size.
-std::string describe(double size, const BySource& errors) {
+std::string describe(double size, BySource errors) {
+  const std::string unknown = std::isfinite(errors[kTime]) ? "" : "; the error of the time steps is not known";
   constexpr double kWorthNaming = 0.05;  // of the sum
   double sum = 0;
-  for (const double error : errors) sum += std::abs(error);
+  for (double& error : errors) {
+    if (!std::isfinite(error)) error = 0;
+    sum += std::abs(error);
+  }
   std::string parts;
   for (int s = 0; s < kErrorSources; ++s)
     if (std::abs(errors[s]) > kWorthNaming * sum)
@@ -76,20 +81,25 @@ std::string describe(double size, const BySource& errors) {
                            100 * std::abs(errors[s]) / size);
   const auto largest =
       std::max_element(errors.begin(), errors.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  return fmt::format("{:.2g} % ({}): {}", 100 * sum / size, parts,
-                     advice_of(static_cast<ErrorSource>(largest - errors.begin())));
+  return fmt::format("{:.2g} % ({}): {}{}", 100 * sum / size, parts,
+                     advice_of(static_cast<ErrorSource>(largest - errors.begin())), unknown);
 }
 
+/// Whether there is a bar: that of time may be missing where others are there.
 bool is_known(const BySource& errors) {
-  return std::all_of(errors.begin(), errors.end(), [](double error) { return std::isfinite(error); });
+  return std::all_of(errors.begin(), errors.begin() + kTime, [](double error) { return std::isfinite(error); });
 }
 
 }  // namespace
 
 std::string advice_of(ErrorSource source) {
   static constexpr std::array<const char*, kErrorSources> kAdvice{
-      "refine the mesh first", "a smaller /contact/dhat first", "a smaller /contact/epsv first",
-      "more /solver/contact/friction_iterations first", "a smaller tolerance of /solver/nonlinear first"};
+      "refine the mesh first",
+      "a smaller /contact/dhat first",
+      "a smaller /contact/epsv first",
+      "more /solver/contact/friction_iterations first",
+      "a smaller tolerance of /solver/nonlinear first",
+      "a smaller /time/dt (or /time/tolerance with dt \"auto\") first"};
   return kAdvice.at(static_cast<std::size_t>(source));
 }
 

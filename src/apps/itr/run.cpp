@@ -254,12 +254,6 @@ class Unlocked {
 };
 
 template <int Dim>
-bool depends_on_path(const Setup<Dim>& setup) {
-  return setup.contact.has_friction() || setup.contact.adhesion.tangential_coefficient > 0 || !setup.damping.empty() ||
-         std::ranges::any_of(setup.materials, [](const auto& entry) { return has_memory(entry.second); });
-}
-
-template <int Dim>
 class Run {
  public:
   Run(Setup<Dim> setup, const scene::Scene& scene, output::Folder folder, const RunOptions& options, int threads,
@@ -271,7 +265,7 @@ class Run {
         units_(scene.output.units),
         simulation_(std::move(setup), registry, make_logger(warnings)),
         accuracy_(scene.accuracy, simulation_.setup().time, simulation_.setup().remesh,
-                  depends_on_path(simulation_.setup())) {
+                  simulation_.setup().depends_on_path()) {
     for (const auto& warning : find_suspicious(simulation_)) warnings.add(warning);
     const output::RunInfo info{options.scene.string(),
                                simulation_.solver_name(),
