@@ -375,6 +375,32 @@ TieOverlap<Dim> overlap_of_tie(Sides<Dim>& sides, const Tie& tie) {
   return overlap;
 }
 
+/// Lets the jump be what it wants in component c: conditions are those of the gaps less that of the largest function.
+template <int Dim>
+void free_jump(int c, std::vector<MortarRow<Dim>>& rows) {
+  const auto is_of = [c](const MortarRow<Dim>& row) { return row.components[c]; };
+  auto largest = rows.end();
+  for (auto row = rows.begin(); row != rows.end(); ++row)
+    if (is_of(*row) && (largest == rows.end() || row->measure > largest->measure)) largest = row;
+  if (largest == rows.end()) return;
+  const MortarRow<Dim> reference = *largest;
+  rows.erase(largest);
+  for (MortarRow<Dim>& row : rows) {
+    if (!is_of(row)) continue;
+    row.against = reference.vertex;
+    row.share = row.measure / reference.measure;
+    std::map<int, double> weights;
+    for (std::size_t i = 0; i < row.nodes.size(); ++i) weights[row.nodes[i]] += row.weights[i];
+    for (std::size_t i = 0; i < reference.nodes.size(); ++i) weights[reference.nodes[i]] -= row.share * reference.weights[i];
+    row.nodes.clear();
+    row.weights.clear();
+    for (const auto& [node, weight] : weights) {
+      row.nodes.push_back(node);
+      row.weights.push_back(weight);
+    }
+  }
+}
+
 }  // namespace
 
 template <int Dim>
@@ -393,8 +419,11 @@ std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const
   for (std::size_t i = 0; i < ties.size(); ++i) {
     mortars.push_back(MortarBuilder<Dim>(cells, overlaps[i], ties[i].jump ? is_never : is_weak).build());
     mortars.back().tie = static_cast<int>(i);
-    if (ties[i].jump)
-      mortars.back().covered *= std::min(1.0, overlaps[i].own.area / overlaps[i].other.area);  // of the larger
+    if (!ties[i].jump) continue;
+    const Vec<3> jump = ties[i].jump(0);
+    for (int c = 0; c < Dim; ++c)
+      if (std::isnan(jump[c])) free_jump<Dim>(c, mortars.back().rows);
+    mortars.back().covered *= std::min(1.0, overlaps[i].own.area / overlaps[i].other.area);  // of the larger
   }
   return mortars;
 }
