@@ -167,7 +167,8 @@ TEST(MeshReaders, MeditHasReferencesAsGroups) {
   EXPECT_EQ(mesh.groups[0].number, 7);
   EXPECT_EQ(mesh.groups[0].members, std::vector<int>{0});
   EXPECT_EQ(mesh.groups[1].dim, 3);
-  const MeshFile flat = read_bytes("a.mesh", "MeshVersionFormatted 2 Dimension 2 Vertices 3 0 0 1 1 0 1 0 2 1 Triangles 1 1 2 3 4");
+  const MeshFile flat =
+      read_bytes("a.mesh", "MeshVersionFormatted 2 Dimension 2 Vertices 3 0 0 1 1 0 1 0 2 1 Triangles 1 1 2 3 4");
   EXPECT_EQ(flat.vertices[2], Vec<3>(0, 2, 0));
   EXPECT_EQ(flat.triangles.size(), 1u);
 }

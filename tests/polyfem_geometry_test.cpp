@@ -5,6 +5,7 @@
 
 #include "advance.hpp"
 #include "block.hpp"
+#include "energy/elastic/law_table.hpp"
 #include "scene/polyfem/tessellation.hpp"
 #include "scene_folder.hpp"
 
@@ -19,8 +20,11 @@ class PolyfemGeometry : public SceneTest {
     write("frames/line10.obj", "v 0 -0.9 0\nv 2 -0.9 0\nl 1 2\n");
     write("frames/line1.obj", "v -1 -1 0\nv 1 -1 0\nl 1 2\n");
     json scene = square();
-    scene["geometry"].push_back(
-        {{"type", "mesh_sequence"}, {"mesh_sequence", "frames"}, {"fps", 10}, {"is_obstacle", true}, {"surface_selection", 7}});
+    scene["geometry"].push_back({{"type", "mesh_sequence"},
+                                 {"mesh_sequence", "frames"},
+                                 {"fps", 10},
+                                 {"is_obstacle", true},
+                                 {"surface_selection", 7}});
     return scene;
   }
   void SetUp() override { fs::create_directories(folder_ / "frames"); }
@@ -162,10 +166,9 @@ TEST_F(PolyfemGeometry, PeriodicCellsAreFreeInComponentsThatAreNotFixed) {
   EXPECT_LE((stretch() - Vec<2>(0, -0.1)).norm(), 1e-8);
   json by_ids = scene;
   by_ids["geometry"][0]["surface_selection"] = {{"threshold", 1e-6}};
-  by_ids["boundary_conditions"] = {
-      {"periodic", json::array({{{"boundary_ids", {1, 3}}}, {{"boundary_ids", {2, 4}}}})}};
-  by_ids["constraints"] = {
-      {"zero_mean", true}, {"macro_displacement_gradient", {{"value", {{0, 0}, {0, -0.1}}}, {"fixed_components", {3}}}}};
+  by_ids["boundary_conditions"] = {{"periodic", json::array({{{"boundary_ids", {1, 3}}}, {{"boundary_ids", {2, 4}}}})}};
+  by_ids["constraints"] = {{"zero_mean", true},
+                           {"macro_displacement_gradient", {{"value", {{0, 0}, {0, -0.1}}}, {"fixed_components", {3}}}}};
   std::swap(scene, by_ids);
   EXPECT_LE((stretch() - Vec<2>(0.1 * ratio, -0.1)).norm(), 1e-8);
 }
@@ -194,7 +197,8 @@ TEST_F(PolyfemGeometry, PeriodicKeysAreRefusedByKey) {
 TEST_F(PolyfemGeometry, InverseStiffnessesMayHaveUnitsOfStress) {
   const auto value = [&](const char* unit) {
     json scene = square();
-    scene["materials"] = {{"type", "UnconstrainedOgden"}, {"mus", 1e4}, {"alphas", 2}, {"Ds", {{"value", 20}, {"unit", unit}}}};
+    scene["materials"] = {
+        {"type", "UnconstrainedOgden"}, {"mus", 1e4}, {"alphas", 2}, {"Ds", {{"value", 20}, {"unit", unit}}}};
     const auto sum = std::static_pointer_cast<const LawSum>(read2(scene).materials.at(1).own);
     return sum->terms.at(0).values.at(2).at(0);
   };

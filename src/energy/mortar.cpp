@@ -375,30 +375,42 @@ TieOverlap<Dim> overlap_of_tie(Sides<Dim>& sides, const Tie& tie) {
   return overlap;
 }
 
+/// `row` less what makes its gap that of a jump that `reference` measures, in component c alone.
+template <int Dim>
+MortarRow<Dim> less_jump(const MortarRow<Dim>& row, const MortarRow<Dim>& reference, int c) {
+  MortarRow<Dim> result = row;
+  result.components.fill(false);
+  result.components[c] = true;
+  result.against = reference.vertex;
+  result.share = row.measure / reference.measure;
+  std::map<int, double> weights;
+  for (std::size_t i = 0; i < row.nodes.size(); ++i) weights[row.nodes[i]] += row.weights[i];
+  for (std::size_t i = 0; i < reference.nodes.size(); ++i)
+    weights[reference.nodes[i]] -= result.share * reference.weights[i];
+  result.nodes.clear();
+  result.weights.clear();
+  for (const auto& [node, weight] : weights) {
+    result.nodes.push_back(node);
+    result.weights.push_back(weight);
+  }
+  return result;
+}
+
 /// Lets the jump be what it wants in component c: conditions are those of the gaps less that of the largest function.
 template <int Dim>
 void free_jump(int c, std::vector<MortarRow<Dim>>& rows) {
-  const auto is_of = [c](const MortarRow<Dim>& row) { return row.components[c]; };
-  auto largest = rows.end();
-  for (auto row = rows.begin(); row != rows.end(); ++row)
-    if (is_of(*row) && (largest == rows.end() || row->measure > largest->measure)) largest = row;
-  if (largest == rows.end()) return;
-  const MortarRow<Dim> reference = *largest;
-  rows.erase(largest);
+  std::optional<MortarRow<Dim>> reference;
+  for (const MortarRow<Dim>& row : rows)
+    if (row.components[c] && (!reference || row.measure > reference->measure)) reference = row;
+  if (!reference) return;
+  std::vector<MortarRow<Dim>> freed;
   for (MortarRow<Dim>& row : rows) {
-    if (!is_of(row)) continue;
-    row.against = reference.vertex;
-    row.share = row.measure / reference.measure;
-    std::map<int, double> weights;
-    for (std::size_t i = 0; i < row.nodes.size(); ++i) weights[row.nodes[i]] += row.weights[i];
-    for (std::size_t i = 0; i < reference.nodes.size(); ++i) weights[reference.nodes[i]] -= row.share * reference.weights[i];
-    row.nodes.clear();
-    row.weights.clear();
-    for (const auto& [node, weight] : weights) {
-      row.nodes.push_back(node);
-      row.weights.push_back(weight);
-    }
+    if (!row.components[c]) continue;
+    if (row.vertex != reference->vertex) freed.push_back(less_jump(row, *reference, c));
+    row.components[c] = false;
   }
+  std::erase_if(rows, [](const MortarRow<Dim>& row) { return row.components == std::array<bool, Dim>{}; });
+  rows.insert(rows.end(), freed.begin(), freed.end());
 }
 
 }  // namespace

@@ -42,8 +42,8 @@ std::string split_advice(const fs::path& file) {
 
 MeshFile read_mesh_file(const fs::path& file) {
   constexpr std::pair<const char*, MeshFile (*)(std::string_view, const fs::path&)> kReaders[] = {
-      {".msh", read_msh}, {".inp", read_inp}, {".obj", read_obj}, {".ply", read_ply},
-      {".stl", read_stl}, {".vtk", read_vtk}, {".vtu", read_vtu}, {".vtp", read_vtu}, {".mesh", read_medit}};
+      {".msh", read_msh}, {".inp", read_inp}, {".obj", read_obj}, {".ply", read_ply},   {".stl", read_stl},
+      {".vtk", read_vtk}, {".vtu", read_vtu}, {".vtp", read_vtu}, {".mesh", read_medit}};
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
   const auto reader =

@@ -20,8 +20,8 @@ struct Section {
 };
 constexpr Section kSections[] = {{"Edges", 2}, {"Triangles", 3}, {"Tetrahedra", 4}};
 constexpr std::string_view kOtherCells[] = {"Quadrilaterals", "Hexahedra", "Hexaedra", "Prisms", "Pyramids"};
-constexpr Section kOthers[] = {{"Corners", 1}, {"RequiredVertices", 1}, {"Ridges", 1}, {"RequiredEdges", 1},
-                               {"RequiredTriangles", 1}};
+constexpr Section kOthers[] = {
+    {"Corners", 1}, {"RequiredVertices", 1}, {"Ridges", 1}, {"RequiredEdges", 1}, {"RequiredTriangles", 1}};
 
 class MeditReader {
  public:

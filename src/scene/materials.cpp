@@ -260,7 +260,8 @@ class MaterialReader {
 
   /// Whether it is AMIPS with a rest pose and nothing else, which costs no energy where a body grows without distortion.
   static bool is_amips(const LawSum& sum) {
-    return std::ranges::all_of(sum.terms, [](const LawSum::Term& term) { return std::string_view(term.row->type) == "AMIPS"; });
+    return std::ranges::all_of(sum.terms,
+                               [](const LawSum::Term& term) { return std::string_view(term.row->type) == "AMIPS"; });
   }
 
   /// A modulus that varies makes everybody ask for the law of each place.

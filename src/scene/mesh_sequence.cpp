@@ -45,7 +45,8 @@ bool is_before(const std::string& a, const std::string& b) {
 /// Whether a name matches a pattern in which * stands for any characters.
 bool matches(std::string_view name, std::string_view pattern) {
   if (pattern.empty()) return name.empty();
-  if (pattern.front() != '*') return !name.empty() && name.front() == pattern.front() && matches(name.substr(1), pattern.substr(1));
+  if (pattern.front() != '*')
+    return !name.empty() && name.front() == pattern.front() && matches(name.substr(1), pattern.substr(1));
   for (std::size_t skipped = 0; skipped <= name.size(); ++skipped)
     if (matches(name.substr(skipped), pattern.substr(1))) return true;
   return false;
@@ -67,7 +68,8 @@ std::vector<std::string> files_of(const Node& node) {
     }
     std::ranges::sort(files, is_before);
   }
-  if (files.empty()) node.fail(abbreviate(node.json()) + ", where there is no file", "a folder of mesh files, or their list");
+  if (files.empty())
+    node.fail(abbreviate(node.json()) + ", where there is no file", "a folder of mesh files, or their list");
   return files;
 }
 

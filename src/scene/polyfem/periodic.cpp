@@ -78,8 +78,8 @@ std::vector<int> tags_of_side(const Node& node, int axis, double place, double t
   std::set<int> tags, elsewhere;
   const int own = free_tag++;
   for (const FacetId f : mesh.live_facets()) {
-    const bool is_in = std::ranges::all_of(
-        mesh.facet(f), [&](VertexId v) { return std::abs(mesh.rest(v)[axis] - place) <= tolerance; });
+    const bool is_in =
+        std::ranges::all_of(mesh.facet(f), [&](VertexId v) { return std::abs(mesh.rest(v)[axis] - place) <= tolerance; });
     if (is_in && mesh.facet_tag(f) == kNoTag) mesh.set_facet_tag(f, own);
     (is_in ? tags : elsewhere).insert(mesh.facet_tag(f));
   }
@@ -87,7 +87,8 @@ std::vector<int> tags_of_side(const Node& node, int axis, double place, double t
     node.fail("no facets in the plane " + std::string(1, static_cast<char>('x' + axis)) + " = " + std::to_string(place),
               "bodies that reach the sides of their box");
   for (const int tag : tags)
-    if (elsewhere.contains(tag)) node.fail("the surface " + std::to_string(tag) + ", which goes around an edge of the box", "sides of their own");
+    if (elsewhere.contains(tag))
+      node.fail("the surface " + std::to_string(tag) + ", which goes around an edge of the box", "sides of their own");
   return {tags.begin(), tags.end()};
 }
 
@@ -145,9 +146,9 @@ void read_periodic_boundary(const Node& root, const Sets& sets, Setup<Dim>& setu
   if (!is_polyfem_set(root)) given.fail("it with other defaults than PolyFEM's", "/ties/*/periodic");
   if (is_of_box && pairs.exists()) pairs.fail("it beside periodic_boundary", "one of both");
   Mesh<Dim>& mesh = setup.mesh;
-  const Gradient<Dim> gradient = is_of_box
-                                     ? Gradient<Dim>(box_sides["linear_displacement_offset"], box_sides["fixed_macro_strain"])
-                                     : Gradient<Dim>(constraint["value"], constraint["fixed_components"]);
+  const Gradient<Dim> gradient =
+      is_of_box ? Gradient<Dim>(box_sides["linear_displacement_offset"], box_sides["fixed_macro_strain"])
+                : Gradient<Dim>(constraint["value"], constraint["fixed_components"]);
   int free_tag = 1;
   for (const auto& [label, ids] : sets.surfaces.all())
     for (const int id : ids) free_tag = std::max(free_tag, id + 1);

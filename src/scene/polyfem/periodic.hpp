@@ -7,7 +7,8 @@
 namespace itr::scene {
 
 /// Ties opposite sides of the bodies' box, or of `boundary_conditions/periodic`. Components of the gradient that are not
-/// fixed are free; of two that a rotation mixes one stays as it is given. Holds a vertex where nothing else holds the bodies.
+/// fixed are free; of two that a rotation mixes one stays as it is given. Holds a vertex where nothing else holds the
+/// bodies.
 template <int Dim>
 void read_periodic_boundary(const Node& root, const Sets& sets, Setup<Dim>& setup);
 
