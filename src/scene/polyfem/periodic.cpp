@@ -18,7 +18,7 @@ namespace {
 template <int Dim>
 class Gradient {
  public:
-  /// Of the matrix that one node gives and the list of fixed components, row by row, that another one does. Without a
+  /// Reads the matrix that one node gives and the list of fixed components, row by row, that another one does. Without a
   /// matrix H is 0.
   Gradient(const Node& matrix, const Node& fixed) {
     components_.fill([](double) { return 0.0; });
