@@ -222,6 +222,13 @@ TEST_F(PolyfemGeometry, AmipsHasNoBulkModulus) {
   EXPECT_EQ(failure(scene).place, "/materials");
 }
 
+TEST_F(PolyfemGeometry, RefusalsOfMaterialsHaveTheirReason) {
+  const auto found = [&](const json& material) { return failure(square({{"materials", material}})).found; };
+  EXPECT_NE(found({{"type", "IncompressibleLinearElasticity"}, {"E", 1e4}, {"nu", 0.49}}).find("pressures"),
+            std::string::npos);
+  EXPECT_NE(found({{"type", "NeoHookean"}, {"E", "by-element.txt"}, {"nu", 0.3}}).find("a file"), std::string::npos);
+}
+
 TEST_F(PolyfemGeometry, BasesThatSpanTheSameFunctionsAreAccepted) {
   read2(square({{"space", {{"basis_type", "Bernstein"}, {"use_p_ref", false}}}}));
   EXPECT_EQ(wrong_place({{"space", {{"basis_type", "Spline"}}}}), "/space/basis_type");
