@@ -50,7 +50,7 @@ inline constexpr double kLargestTieGap = 0.1;  ///< at rest, of the edges there
 /// Makes the mortars of ties on `cells`, which have to outlive them. `is_held(node, c)`: whether a condition holds the
 /// node's component c. Functions at such vertices, at those where two ties meet and at those that hardly overlap have no
 /// conditions of their own: the functions beside them take their place. Of ties with a jump all functions have conditions,
-/// in a free component all but one, which measures the jump that the others follow.
+/// in a free component (NaN) all but one, which measures the jump that the others follow.
 template <int Dim>
 std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const Tie> ties,
                                       const std::function<bool(int node, int c)>& is_held);

@@ -112,6 +112,11 @@ std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const G
   const Node node = root["contact"]["collision_mesh"];
   if (root["space"]["remesh"]["enabled"].boolean(false))
     node.fail("a collision mesh where the bodies' mesh changes", "one or the other (space/remesh/enabled)");
+  for (const char* key : {"max_edge_length", "tessellation_type"})
+    if (node.has(key) && !is_cut_boundary(root))
+      node[key].fail(abbreviate(node[key].json()) + ", which has no effect", "max_edge_length without mesh");
+  for (const char* key : {"mesh", "linear_map"})
+    if (node.has(key) && is_cut_boundary(root)) node[key].fail("it beside max_edge_length", "one of both");
   if (is_cut_boundary(root)) return cut_boundary<Dim>(node, mesh, setup.order);
   for (const Node& geometry : geometries.bodies)
     if (geometry["n_refs"].integer(0) != 0) geometry["n_refs"].fail("0: a collision mesh follows the vertices of the file");
