@@ -390,15 +390,18 @@ TEST_F(CollisionMeshScene, RefusesWhatItCannotBeCombinedWith) {
   };
   expect_refusal("scene.json", "/contact/collision_mesh", "the bodies' mesh changes", "one or the other",
                  {{"space", {{"remesh", {{"enabled", true}}}}}});
-  expect_refusal("scene.json", "/contact/collision_mesh/max_edge_length", "0.1", "not supported",
+  expect_refusal("scene.json", "/contact/collision_mesh/max_edge_length", "no effect", "without mesh",
                  with("max_edge_length", 0.1));
-  expect_refusal("scene.json", "/contact/collision_mesh/tessellation_type", "regular", "not supported",
+  expect_refusal("scene.json", "/contact/collision_mesh/tessellation_type", "no effect", "without mesh",
                  with("tessellation_type", "regular"));
   expect_refusal("scene.json", "/contact/collision_mesh/linear_map", "nothing", "HDF5 file with weights",
                  with("linear_map", nullptr));
   expect_refusal("scene.json", "/contact/collision_mesh/linear_map", "no.h5", "HDF5 file with weights",
                  with("linear_map", "no.h5"));
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "nothing", "a mesh file", with("mesh", nullptr));
+  Json both = with("max_edge_length", 0.1);
+  both["contact"]["collision_mesh"]["mesh"] = nullptr;
+  expect_refusal("scene.json", "/contact/collision_mesh/linear_map", "beside max_edge_length", "one of both", both);
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "no.ply", "a mesh file", with("mesh", "no.ply"));
   expect_refusal("scene.json", "/contact/collision_mesh/mesh", "star.msh", "a surface", with("mesh", "star.msh"));
   Json refined = scene();

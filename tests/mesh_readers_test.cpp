@@ -150,6 +150,44 @@ std::string binary_ply(const std::string& end = "\n") {
   return bytes + raw(std::uint8_t{3}, int32_t{0}, int32_t{3}, int32_t{1}, 0.5f);
 }
 
+const std::string kMedit =
+    "MeshVersionFormatted 1\n# made by hand\nDimension 3\nVertices\n4\n0 0 0 0\n1 0 0 0\n0 1 0 0\n0 0 1.5 0\n"
+    "Triangles\n2\n1 2 3 7\n1 2 4 0\nCorners\n1\n4\nHexahedra 0\nTetrahedra\n1\n1 2 3 4 5\nEnd\n";
+
+TEST(MeshReaders, MeditHasReferencesAsGroups) {
+  const MeshFile mesh = read_bytes("a.mesh", kMedit);
+  ASSERT_EQ(mesh.vertices.size(), 4u);
+  EXPECT_EQ(mesh.vertices[3], Vec<3>(0, 0, 1.5));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<int, 3>>{{0, 1, 2}, {0, 1, 3}}));
+  EXPECT_EQ(mesh.tetrahedra, (std::vector<std::array<int, 4>>{{0, 1, 2, 3}}));
+  EXPECT_EQ(mesh.triangle_body, (std::vector<int>{7, 0}));
+  EXPECT_EQ(mesh.tetrahedron_body, (std::vector<int>{5}));
+  ASSERT_EQ(mesh.groups.size(), 2u);
+  EXPECT_EQ(mesh.groups[0].dim, 2);
+  EXPECT_EQ(mesh.groups[0].number, 7);
+  EXPECT_EQ(mesh.groups[0].members, std::vector<int>{0});
+  EXPECT_EQ(mesh.groups[1].dim, 3);
+  const MeshFile flat =
+      read_bytes("a.mesh", "MeshVersionFormatted 2 Dimension 2 Vertices 3 0 0 1 1 0 1 0 2 1 Triangles 1 1 2 3 4");
+  EXPECT_EQ(flat.vertices[2], Vec<3>(0, 2, 0));
+  EXPECT_EQ(flat.triangles.size(), 1u);
+}
+
+std::string changed(std::string text, const std::string& from, const std::string& to);
+
+TEST(MeshReaders, SaysWhereAMeditFileIsWrong) {
+  const auto found = [](const std::string& from, const std::string& to) {
+    const auto parts = failure("a.mesh", changed(kMedit, from, to));
+    return parts.place + " " + parts.found;
+  };
+  EXPECT_EQ(found("MeshVersionFormatted", "solid"), "line 1 another beginning");
+  EXPECT_NE(found("Hexahedra 0", "Hexahedra 1").find("'Hexahedra'"), std::string::npos);
+  EXPECT_NE(found("Corners", "Colours").find("'Colours'"), std::string::npos);
+  EXPECT_EQ(found("1 2 3 4 5", "1 2 3 0 5"), "line 20 vertex 0");
+  EXPECT_EQ(found("1 2 3 4 5", "1 2 3 9 5"), "tetrahedron 0 vertex 8 (0-based)");
+  EXPECT_NE(found("Vertices\n4", "Vertices\n4000").find("a count of 4000"), std::string::npos);
+}
+
 TEST(MeshReaders, PlyTextAndBinary) {
   for (const std::string& bytes : {kTextPly, binary_ply(), binary_ply("\r\n")}) {
     const MeshFile mesh = read_bytes("a.ply", bytes);

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "advance.hpp"
@@ -100,6 +102,52 @@ TEST(PeriodicTie, LaminatesHaveTheirEffectiveModuli) {
   EXPECT_NEAR(traction_of_laminate(along, true)[0], mean * kStrain, 1e-6 * mean * kStrain);
   EXPECT_NEAR(traction_of_laminate(across, false)[1], harmonic * kStrain, 1e-6 * mean * kStrain);
   EXPECT_NEAR(traction_of_laminate(shear, false)[0], harmonic / 2 * kStrain, 1e-6 * mean * kStrain);
+}
+
+/// Pulled along its last axis and free otherwise, a cell of one material is in uniaxial stress, whatever its meshes.
+template <int Dim>
+void expect_uniaxial_cell(int below, int above, int order) {
+  Mat<Dim> gradient = Mat<Dim>::Zero();
+  gradient(Dim - 1, Dim - 1) = 0.1;
+  Setup<Dim> setup = periodic_cell<Dim>(gradient, below, above);
+  setup.order = {{1, order}, {2, order}};
+  for (auto& [body, material] : setup.materials) material.law = MaterialLaw::linear, material.poisson_ratio = 0.3;
+  constexpr double kFree = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t tie = 1; tie < setup.ties.size(); ++tie) {  // behind that of the layers
+    Vec<3> jump = setup.ties[tie].jump(0);
+    if (tie + 1 < setup.ties.size())
+      jump[static_cast<Eigen::Index>(tie) - 1] = kFree;
+    else  // the last axis is free to turn upon the others
+      jump.head<Dim - 1>().setConstant(kFree);
+    setup.ties[tie].jump = [jump](double) { return jump; };
+  }
+  ask_for_forces(setup);
+  linear::Registry registry;
+  Simulation<Dim> simulation(setup, registry);
+  advance(simulation);
+  EXPECT_LE(spread_of_strain(simulation), 1e-8);
+  const CellSet<Dim> cells = whole_mesh(simulation.mesh(), {});
+  const Mat<Dim> H = deformation_gradient<Dim>(cells.elements[0], simulation.state().history.x[0]) - Mat<Dim>::Identity();
+  const Material& material = setup.materials.at(1);
+  const double lambda = material.lame_lambda(Dim), mu = material.lame_mu();
+  Mat<Dim> expected = gradient;
+  for (int c = 0; c + 1 < Dim; ++c) expected(c, c) = -0.1 * lambda / ((Dim - 1) * lambda + 2 * mu);
+  EXPECT_LE((H - expected).norm(), 1e-8);
+  const auto force = [&](int tag) {
+    const auto sums = force_sums(simulation.state(), simulation.forces(), {.name = "", .surfaces = {tag}});
+    return Vec<Dim>(sums.contact.force.template head<Dim>());
+  };
+  const double pull = force(kAbove)[Dim - 1];
+  EXPECT_GT(pull, 0);
+  EXPECT_LE(force(kAbove).template head<Dim - 1>().norm(), 1e-6 * pull);
+  EXPECT_LE(std::abs(force(kRight)[0]), 1e-6 * pull);
+}
+
+TEST(PeriodicTie, FreeComponentsLeaveNoForce) {
+  expect_uniaxial_cell<2>(3, 3, 1);
+  expect_uniaxial_cell<2>(3, 4, 1);
+  expect_uniaxial_cell<2>(4, 3, 2);
+  expect_uniaxial_cell<3>(2, 3, 1);
 }
 
 TEST(PeriodicTie, SidesHaveOneShape) {

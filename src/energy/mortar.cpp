@@ -375,6 +375,44 @@ TieOverlap<Dim> overlap_of_tie(Sides<Dim>& sides, const Tie& tie) {
   return overlap;
 }
 
+/// `row` less what makes its gap that of a jump that `reference` measures, in component c alone.
+template <int Dim>
+MortarRow<Dim> less_jump(const MortarRow<Dim>& row, const MortarRow<Dim>& reference, int c) {
+  MortarRow<Dim> result = row;
+  result.components.fill(false);
+  result.components[c] = true;
+  result.against = reference.vertex;
+  result.share = row.measure / reference.measure;
+  std::map<int, double> weights;
+  for (std::size_t i = 0; i < row.nodes.size(); ++i) weights[row.nodes[i]] += row.weights[i];
+  for (std::size_t i = 0; i < reference.nodes.size(); ++i)
+    weights[reference.nodes[i]] -= result.share * reference.weights[i];
+  result.nodes.clear();
+  result.weights.clear();
+  for (const auto& [node, weight] : weights) {
+    result.nodes.push_back(node);
+    result.weights.push_back(weight);
+  }
+  return result;
+}
+
+/// Lets the jump be what it wants in component c: conditions are those of the gaps less that of the largest function.
+template <int Dim>
+void free_jump(int c, std::vector<MortarRow<Dim>>& rows) {
+  std::optional<MortarRow<Dim>> reference;
+  for (const MortarRow<Dim>& row : rows)
+    if (row.components[c] && (!reference || row.measure > reference->measure)) reference = row;
+  if (!reference) return;
+  std::vector<MortarRow<Dim>> freed;
+  for (MortarRow<Dim>& row : rows) {
+    if (!row.components[c]) continue;
+    if (row.vertex != reference->vertex) freed.push_back(less_jump(row, *reference, c));
+    row.components[c] = false;
+  }
+  std::erase_if(rows, [](const MortarRow<Dim>& row) { return row.components == std::array<bool, Dim>{}; });
+  rows.insert(rows.end(), freed.begin(), freed.end());
+}
+
 }  // namespace
 
 template <int Dim>
@@ -393,8 +431,11 @@ std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const
   for (std::size_t i = 0; i < ties.size(); ++i) {
     mortars.push_back(MortarBuilder<Dim>(cells, overlaps[i], ties[i].jump ? is_never : is_weak).build());
     mortars.back().tie = static_cast<int>(i);
-    if (ties[i].jump)
-      mortars.back().covered *= std::min(1.0, overlaps[i].own.area / overlaps[i].other.area);  // of the larger
+    if (!ties[i].jump) continue;
+    const Vec<3> jump = ties[i].jump(0);
+    for (int c = 0; c < Dim; ++c)
+      if (std::isnan(jump[c])) free_jump<Dim>(c, mortars.back().rows);
+    mortars.back().covered *= std::min(1.0, overlaps[i].own.area / overlaps[i].other.area);  // of the larger
   }
   return mortars;
 }

@@ -24,6 +24,8 @@ struct MortarRow {
   double measure = 0;           ///< integral of the function [as the weights]
   double length = 0;            ///< of facets [m]
   std::array<int, 2> bodies{};  ///< one of each side
+  int against = kNone;          ///< of a jump that is free: vertex of the function whose mean is the jump
+  double share = 0;             ///< of that function's weights, which were taken from these
 };
 
 /// A Tie on one mesh. Side 0 has the functions: of the sides that the other covers the finer one.
@@ -47,7 +49,8 @@ inline constexpr double kLargestTieGap = 0.1;  ///< at rest, of the edges there
 
 /// Makes the mortars of ties on `cells`, which have to outlive them. `is_held(node, c)`: whether a condition holds the
 /// node's component c. Functions at such vertices, at those where two ties meet and at those that hardly overlap have no
-/// conditions of their own: the functions beside them take their place. Of ties with a jump all functions have conditions.
+/// conditions of their own: the functions beside them take their place. Of ties with a jump all functions have conditions,
+/// in a free component (NaN) all but one, which measures the jump that the others follow.
 template <int Dim>
 std::vector<Mortar<Dim>> make_mortars(const CellSet<Dim>& cells, std::span<const Tie> ties,
                                       const std::function<bool(int node, int c)>& is_held);

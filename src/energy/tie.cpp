@@ -171,7 +171,8 @@ void TieEnergy<Dim>::set_jumps(std::span<const Tie> ties, double t) {
     const Tie& tie = ties[static_cast<std::size_t>(row.mortar->tie)];
     if (!tie.jump) continue;
     const Vec<Dim> jump = (row.mortar->is_own_b ? 1 : -1) * tie.jump(t).template head<Dim>();
-    for (int c = 0; c < Dim; ++c) row.target[c] = row.of->components[c] ? row.of->measure * jump[c] : 0;
+    for (int c = 0; c < Dim; ++c)
+      row.target[c] = row.of->components[c] && row.of->against == kNone ? row.of->measure * jump[c] : 0;
   }
 }
 
@@ -227,7 +228,10 @@ std::vector<TractionOfTie<Dim>> TieEnergy<Dim>::tractions() const {
     std::map<std::pair<int, int>, double> values;  // by vertex and component
     for (std::size_t i = 0; i < mortar.rows.size(); ++i, ++row)
       for (int c = 0; c < Dim; ++c)
-        if (row->of->components[c]) values[{row->of->vertex, c}] = row->multiplier[c];
+        if (row->of->components[c]) {
+          values[{row->of->vertex, c}] += row->multiplier[c];
+          if (row->of->against != kNone) values[{row->of->against, c}] -= row->of->share * row->multiplier[c];
+        }
     std::vector<typename MultiplierField<Dim>::Facet> facets;
     std::vector<Box<Dim>> boxes;
     for (std::size_t f = 0; f < mortar.facets.size(); ++f) {

@@ -42,8 +42,8 @@ std::string split_advice(const fs::path& file) {
 
 MeshFile read_mesh_file(const fs::path& file) {
   constexpr std::pair<const char*, MeshFile (*)(std::string_view, const fs::path&)> kReaders[] = {
-      {".msh", read_msh}, {".inp", read_inp}, {".obj", read_obj}, {".ply", read_ply},
-      {".stl", read_stl}, {".vtk", read_vtk}, {".vtu", read_vtu}, {".vtp", read_vtu}};
+      {".msh", read_msh}, {".inp", read_inp}, {".obj", read_obj}, {".ply", read_ply},   {".stl", read_stl},
+      {".vtk", read_vtk}, {".vtu", read_vtu}, {".vtp", read_vtu}, {".mesh", read_medit}};
   std::string ending = file.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
   const auto reader =
@@ -51,7 +51,7 @@ MeshFile read_mesh_file(const fs::path& file) {
   if (reader == std::end(kReaders))
     throw InputError(
         {file.string(), "", "a name that ends in " + quoted(std::string_view(ending)),
-         ".msh, .inp, .vtu, .vtp, .vtk, .stl, .obj or .ply (geometry of CAD is meshed by Gmsh, other meshes are "
+         ".msh, .mesh, .inp, .vtu, .vtp, .vtk, .stl, .obj or .ply (geometry of CAD is meshed by Gmsh, other meshes are "
          "converted by `meshio convert`: docs/user-guide.md, \"Mesh files\")"});
   const std::optional<std::string> bytes = read_file(file);
   if (!bytes) throw InputError({file.string(), "", "no readable file", "a mesh file"});

@@ -15,6 +15,7 @@ std::string split_advice(const std::filesystem::path& file);
 MeshFile read_msh(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_obj(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_ply(std::string_view bytes, const std::filesystem::path& file);
+MeshFile read_medit(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_inp(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_stl(std::string_view bytes, const std::filesystem::path& file);
 MeshFile read_vtk(std::string_view bytes, const std::filesystem::path& file);

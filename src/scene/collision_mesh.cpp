@@ -4,6 +4,8 @@
 #include <cstdint>
 
 #include "core/hdf5.hpp"
+#include "mesh/facet_measure.hpp"
+#include "polyfem/tessellation.hpp"
 #include "readers.hpp"
 
 namespace itr::scene {
@@ -74,13 +76,48 @@ bool has_collision_mesh(const Node& root) {
   return node.exists() && node["enabled"].boolean(true) && root["contact"]["enabled"].boolean(false);
 }
 
+bool is_cut_boundary(const Node& root) {
+  const Node node = root["contact"]["collision_mesh"];
+  return node.has("max_edge_length") && !node.has("mesh");
+}
+
+namespace {
+
+/// The boundary itself, cut into smaller triangles.
 template <int Dim>
-std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries, const Mesh<Dim>& mesh,
-                                                       MeshFiles& files, std::vector<std::string>& warnings) {
+CollisionProxy<Dim> cut_boundary(const Node& node, const Mesh<Dim>& mesh, const std::map<int, int>& order) {
+  if constexpr (Dim == 3) {
+    constexpr int kParts = 9;  // of "regular", as PolyFEM takes them whatever the length is
+    constexpr double kMostTriangles = 2e7;
+    const Node length = node["max_edge_length"];
+    const double longest = length.positive(1);
+    const bool is_regular = node["tessellation_type"].choice({"regular", "irregular"}, 0) == 0;
+    double area = 0;
+    for (const FacetId f : mesh.live_facets()) area += facet_measure(mesh, f);
+    if (!is_regular && area > kMostTriangles * longest * longest) length.fail("a larger length: too many triangles");
+    return tessellate(mesh, order, {longest, is_regular ? kParts : 0});
+  } else {
+    node["max_edge_length"].fail("it in the plane", "a scene in space, or mesh and linear_map");
+  }
+}
+
+}  // namespace
+
+template <int Dim>
+std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries,
+                                                       const Setup<Dim>& setup, MeshFiles& files,
+                                                       std::vector<std::string>& warnings) {
   if (!has_collision_mesh(root)) return {};
+  const Mesh<Dim>& mesh = setup.mesh;
   const Node node = root["contact"]["collision_mesh"];
   if (root["space"]["remesh"]["enabled"].boolean(false))
     node.fail("a collision mesh where the bodies' mesh changes", "one or the other (space/remesh/enabled)");
+  for (const char* key : {"max_edge_length", "tessellation_type"})
+    if (node.has(key) && !is_cut_boundary(root))
+      node[key].fail(abbreviate(node[key].json()) + ", which has no effect", "max_edge_length without mesh");
+  for (const char* key : {"mesh", "linear_map"})
+    if (node.has(key) && is_cut_boundary(root)) node[key].fail("it beside max_edge_length", "one of both");
+  if (is_cut_boundary(root)) return cut_boundary<Dim>(node, mesh, setup.order);
   for (const Node& geometry : geometries.bodies)
     if (geometry["n_refs"].integer(0) != 0) geometry["n_refs"].fail("0: a collision mesh follows the vertices of the file");
   Obstacles<Dim> surface = read_surface<Dim>(node, root["geometry"].items().front(), files);
@@ -99,9 +136,9 @@ std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const G
   return proxy;
 }
 
-template std::optional<CollisionProxy<2>> read_collision_mesh(const Node&, const Geometries&, const Mesh<2>&, MeshFiles&,
+template std::optional<CollisionProxy<2>> read_collision_mesh(const Node&, const Geometries&, const Setup<2>&, MeshFiles&,
                                                               std::vector<std::string>&);
-template std::optional<CollisionProxy<3>> read_collision_mesh(const Node&, const Geometries&, const Mesh<3>&, MeshFiles&,
+template std::optional<CollisionProxy<3>> read_collision_mesh(const Node&, const Geometries&, const Setup<3>&, MeshFiles&,
                                                               std::vector<std::string>&);
 
 }  // namespace itr::scene

@@ -375,9 +375,14 @@ class ConditionReader {
     for (const Node& node : boundary_["dirichlet_boundary"].items()) entries.push_back(node);
     Obstacles<Dim>& obstacles = geometry.obstacles;
     std::vector<char> is_taken(obstacles.rest.size(), false);
+    for (std::size_t v = 0; v < obstacles.rest.size(); ++v) is_taken[v] = obstacles.motion[v] != kNone;
+    const std::vector<char> is_of_sequence = is_taken;
     for (const Node& node : entries) {
       const bool matches_all = is_all(node["id"]);
       const int id = matches_all ? kNoTag : obstacle_of(node["id"]);
+      for (std::size_t v = 0; v < obstacles.rest.size(); ++v)
+        if (is_of_sequence[v] && id != kNoTag && id == geometry.id[v])
+          node["id"].fail(abbreviate(node["id"].json()) + ", an obstacle that its mesh_sequence moves", "another one");
       const ValueFunction<Dim> value = read_function<Dim>(node["value"], node["interpolation"]);
       std::vector<Vec<Dim>> moved;
       for (std::size_t v = 0; v < obstacles.rest.size(); ++v) {

@@ -117,6 +117,9 @@ ValueFunction<Dim> combine(const std::array<Component, Dim>& components, const S
 
 ScalarValue read_scalar(const Node& node, double fallback) {
   if (!node.exists() || !node.json().is_string()) return {node.number(fallback), {}};
+  if (node.json().get<std::string>().ends_with(".txt"))
+    node.fail(abbreviate(node.json()) + ", a file",
+              "a number or an expression of place; ids give parts of a mesh their own");
   Expression expression = parse_expression(node);
   if (expression.uses_time()) node.fail(abbreviate(node.json()), "a value that does not change with time");
   const double unit = node.document().units.factor(node.unit());

@@ -422,8 +422,7 @@ Geometries list_geometries(const Node& root) {
   for (const Node& geometry : root["geometry"].items()) {
     if (!geometry["enabled"].boolean(true)) continue;
     const int type = geometry["type"].choice({"mesh", "mesh_array", "plane", "ground", "mesh_sequence"}, 0);
-    if (type > 3) geometry["type"].fail("\"mesh\", \"mesh_array\", \"plane\" or \"ground\": it is not supported yet");
-    const bool is_flat_obstacle = type > 1;
+    const bool is_flat_obstacle = type == 2 || type == 3;
     for (const char* key : {"point", "normal", "height"})
       if (geometry.has(key) && (type != 2 + (key == std::string("height"))))
         geometry[key].fail("it beside this type", "point and normal with \"plane\", height with \"ground\"");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "defaults.hpp"
@@ -232,8 +233,13 @@ class MaterialReader {
       node_.fail(text.str(), "one > 0" + std::string(law.row ? "" : " of the sum"));
     };
     if (!(shear > 0)) refuse("shear", shear);
-    if (!(bulk > 0)) refuse("bulk", bulk);
+    const bool is_conformal = is_polyfem_set(Node(node_.document())) && is_amips(sum);
+    if (!(bulk > 0) && !is_conformal) refuse("bulk", bulk);
     material_ = material_of(sum, dimension_);
+    if (is_conformal) {  // E and nu are scales here, and no bulk modulus gives them
+      material_.poisson_ratio = 0;
+      material_.youngs_modulus = 2 * shear;
+    }
     if (is_of_ideal_cell(material_)) ask_for_each_place();
     if (is_of_ideal_cell(material_) && node_.has("eigenstrain"))
       node_["eigenstrain"].fail("it in AMIPS without a rest pose", "no such key");
@@ -250,6 +256,12 @@ class MaterialReader {
       if (requirement.value.function) ask_for_each_place();
       requirements_.push_back(std::move(requirement));
     }
+  }
+
+  /// Whether it is AMIPS with a rest pose and nothing else, which costs no energy where a body grows without distortion.
+  static bool is_amips(const LawSum& sum) {
+    return std::ranges::all_of(sum.terms,
+                               [](const LawSum::Term& term) { return std::string_view(term.row->type) == "AMIPS"; });
   }
 
   /// A modulus that varies makes everybody ask for the law of each place.

@@ -12,6 +12,7 @@
 #include "core/sorted.hpp"
 #include "geometry.hpp"
 #include "mesh/rest_box.hpp"
+#include "mesh_sequence.hpp"
 #include "shapes.hpp"
 #include "transformation.hpp"
 
@@ -278,8 +279,9 @@ void append(const Surface& surface, const std::vector<Vec<Dim>>& points, const V
 }
 
 template <int Dim>
-void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets, const std::vector<ShapeEntry>& shapes,
+void read_obstacle(const Node& geometry, MeshFiles& files, const Sets& sets, const std::vector<ShapeEntry>& shapes,
                    ObstacleGeometry<Dim>& out) {
+  const MeshFile& file = files.get(geometry);
   if (Dim == 2 && !is_flat(file))
     geometry["mesh"].fail(abbreviate(geometry["mesh"].json()) + ", a surface in space, where no body has tetrahedra (2D)",
                           "a line or a flat mesh");
@@ -294,8 +296,11 @@ void read_obstacle(const Node& geometry, const MeshFile& file, const Sets& sets,
   if (extract == 3) surface.triangles.clear(), surface.edges.clear();
   check_lengths<Dim>(geometry["mesh"], surface, points);
   const int id = read_obstacle_id(geometry, sets);
-  if (id != kNoTag && extract < 2) put_onto<Dim>(shapes, id, surface, points);
+  const bool is_sequence = is_mesh_sequence(geometry);
+  if (id != kNoTag && extract < 2 && !is_sequence) put_onto<Dim>(shapes, id, surface, points);
+  const std::size_t first = out.obstacles.rest.size();
   for (const Vec<Dim>& shift : read_copies<Dim>(geometry, box.sizes())) append<Dim>(surface, points, shift, id, out);
+  if (is_sequence) add_sequence<Dim>(geometry, files, surface.is_used, first, out.obstacles);
 }
 
 /// One edge or triangle that reaches ten times as far as the bodies do at the start, seen from above their middle: an edge
@@ -351,7 +356,7 @@ ObstacleGeometry<Dim> read_obstacles(const Geometries& geometries, MeshFiles& fi
     if (is_flat_obstacle(geometry))
       read_flat<Dim>(geometry, rest_box(bodies), sets, all);
     else
-      read_obstacle<Dim>(geometry, files.get(geometry), sets, shapes, all);
+      read_obstacle<Dim>(geometry, files, sets, shapes, all);
     all.part.resize(all.obstacles.rest.size(), part);
   }
   files.take_notes(warnings);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <optional>
 
+#include "defaults.hpp"
 #include "key_table.hpp"
 #include "readers.hpp"
 
@@ -140,9 +141,12 @@ void convert(Json& json, const std::string& pointer, const Document& document) {
   const std::string& wanted = entry->key->unit;
   const std::optional<Unit> unit = parse_unit(json["unit"].get<std::string>());
   if (!unit) fail("a unit made of m, g, s, N, Pa, J and the like by * / ^, as \"mN/mm^2\"");
-  if (unit->exponents != exponents_of(wanted))
-    fail(wanted.empty() ? "a number: the value has no unit" : "a unit of " + wanted);
-  const double factor = unit->factor / document.units.factor(wanted);
+  const bool is_as_wanted = unit->exponents == exponents_of(wanted);
+  // PolyFEM takes the numbers of Ds, which are inverse stiffnesses, as ones in units of stress.
+  const bool is_of_polyfem = !is_as_wanted && pointer.find("/Ds") != pointer.npos && is_polyfem_set(Node(document)) &&
+                             unit->exponents == exponents_of("Pa");
+  if (!is_as_wanted && !is_of_polyfem) fail(wanted.empty() ? "a number: the value has no unit" : "a unit of " + wanted);
+  const double factor = unit->factor / document.units.factor(is_of_polyfem ? "Pa" : wanted);
   const Json value = json["value"];
   if (value.is_string())
     json = factor == 1 ? value.get<std::string>() : fmt::format("{} * ({})", factor, value.get<std::string>());

@@ -94,11 +94,15 @@ void read_preset_problem(const Node& root, const LabelIds& bodies, Setup<Dim>& s
 /// Whether the scene has a collision mesh that matters.
 bool has_collision_mesh(const Node& root);
 
-/// Its surface, transformed as the first geometry is, and its weights over the vertices of `mesh`, which must be those of
-/// the bodies' files in their order. Nothing where the scene has none.
+/// Whether it is the bodies' own boundary, cut into smaller facets.
+bool is_cut_boundary(const Node& root);
+
+/// Its surface, transformed as the first geometry is, and its weights over the vertices of the setup's mesh, which must be
+/// those of the bodies' files in their order; or that mesh's boundary, cut. Nothing where the scene has none.
 template <int Dim>
-std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries, const Mesh<Dim>& mesh,
-                                                       MeshFiles& files, std::vector<std::string>& warnings);
+std::optional<CollisionProxy<Dim>> read_collision_mesh(const Node& root, const Geometries& geometries,
+                                                       const Setup<Dim>& setup, MeshFiles& files,
+                                                       std::vector<std::string>& warnings);
 
 // `/output/forces`: whose forces are summed.
 

@@ -10,7 +10,9 @@
 #include "geometry.hpp"
 #include "mesh/facet_tags.hpp"
 #include "mesh/rest_box.hpp"
+#include "mesh_sequence.hpp"
 #include "polyfem/geometric_contact.hpp"
+#include "polyfem/periodic.hpp"
 #include "polyfem/python_value.hpp"
 #include "readers.hpp"
 #include "rigid.hpp"
@@ -108,6 +110,7 @@ void read_model(const Node& root, const Sets& sets, const std::vector<ShapeEntry
   read_conditions<Dim>(root, sets, std::move(obstacles), setup, warnings);
   read_preset_problem<Dim>(root, sets.bodies, setup);
   setup.ties = read_ties<Dim>(root, sets, setup.mesh, setup.time);
+  read_periodic_boundary<Dim>(root, sets, setup);
   read_supports<Dim>(root, sets, setup);
   add_shapes<Dim>(shapes, setup);
   warn_of_idle_keys(root, setup.time, !setup.obstacles.rest.empty(), warnings);
@@ -158,7 +161,7 @@ Setup<Dim> read_setup(const Node& root, const Geometries& geometries, MeshFiles&
   setup.fields.curves = std::move(curves);
   setup.fields.points = read_points<Dim>(root);
   setup.fields.error_bars = root["output"]["error_bars"].boolean(false);
-  setup.proxy = read_collision_mesh<Dim>(root, geometries, setup.mesh, files, warnings);
+  setup.proxy = read_collision_mesh<Dim>(root, geometries, setup, files, warnings);
   setup.contact = read_contact(root, shortest_surface_edge(setup), warnings);
   setup.contact.friction_pairs = read_friction_pairs<Dim>(root, parts, sets, setup.mesh);
   read_geometric_contact(root, setup);
@@ -182,12 +185,13 @@ void for_each_file(const Node& root, const Geometries& geometries, const Functio
   for (const auto* list : {&geometries.bodies, &geometries.obstacles})
     for (const Node& geometry : *list) {
       if (!is_flat_obstacle(geometry)) f(geometry["mesh"], MeshFiles::kMesh);
+      for (const Node& frame : geometry["mesh_sequence"].items()) f(frame["mesh"], MeshFiles::kMesh);
       for (const char* selection : {"volume_selection", "surface_selection", "point_selection"})
         if (const Node name = find_selection_file(geometry[selection]); name.exists()) f(name, "a file of ids");
     }
   for (const char* part : {"boundary_conditions", "initial_conditions"})
     for_each_python_file(root[part], [&](const Node& name) { f(name, "a Python file"); });
-  if (!has_collision_mesh(root)) return;
+  if (!has_collision_mesh(root) || is_cut_boundary(root)) return;
   const Node node = root["contact"]["collision_mesh"];
   f(node["mesh"], MeshFiles::kMesh);
   f(node["linear_map"], MeshFiles::kWeights);
@@ -256,6 +260,7 @@ Scene read(const std::filesystem::path& file, const std::vector<Override>& overr
   check_keys(document, scene.warnings);
   MeshFiles files;
   const Json as_written = document.json;
+  expand_mesh_sequences(document);
   scene.accuracy = apply_accuracy(document);
   scene.defaults = apply_defaults(document);
   const Geometries geometries = list_geometries(root);

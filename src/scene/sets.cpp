@@ -52,6 +52,8 @@ References collect_references(const Node& root) {
       for (auto* labels : {&references.bodies, &references.surfaces}) add_labels(entry[side], *labels);
   for (const Node& entry : root["boundary_conditions"]["pressure_cavity"].items())
     add_labels(entry["id"], references.surfaces);
+  for (const Node& entry : root["boundary_conditions"]["periodic"].items())
+    add_labels(entry["boundary_ids"], references.surfaces);
   for (const char* list : {"springs", "couplings"})
     for (const Node& entry : root[list].items()) add_labels(entry["id"], references.surfaces);
   for (const Node& entry : root["shapes"].items()) add_labels(entry["surface"], references.surfaces);

@@ -1,12 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <limits>
 #include <set>
 
+#include "function.hpp"
 #include "readers.hpp"
 #include "rigid.hpp"
 #include "supports.hpp"
 
 namespace itr::scene {
+
+/// A jump with components that are "free", which are NaN.
+template <int Dim>
+std::function<Vec<3>(double)> read_free_jump(const std::vector<Node>& items) {
+  std::vector<std::function<double(const Vec<Dim>&, double)>> components;
+  for (const Node& item : items) {
+    const bool is_free = item.json() == "free";
+    components.push_back(is_free ? nullptr : read_scalar_function<Dim>(item, item["no such key"]).function);
+  }
+  return [components](double t) {
+    Vec<3> jump = Vec<3>::Zero();
+    for (int c = 0; c < Dim; ++c) {
+      const auto& component = components[static_cast<std::size_t>(c)];
+      jump[c] = component ? component(Vec<Dim>::Zero(), t) : std::numeric_limits<double>::quiet_NaN();
+    }
+    return jump;
+  };
+}
 
 template <int Dim>
 std::function<Vec<3>(double)> read_jump(const Node& node, const TimeOptions& time) {
@@ -14,6 +34,11 @@ std::function<Vec<3>(double)> read_jump(const Node& node, const TimeOptions& tim
   if (!node["periodic"].boolean(false)) {
     if (jump.exists()) jump.fail(abbreviate(jump.json()) + ", which has no effect", "\"periodic\": true beside it");
     return {};
+  }
+  const std::vector<Node> items = jump.items();
+  if (std::ranges::any_of(items, [](const Node& item) { return item.json() == "free"; })) {
+    if (items.size() != Dim) jump.fail(std::to_string(Dim) + " numbers, expressions or \"free\"");
+    return read_free_jump<Dim>(items);
   }
   if (auto function = read_vector<Dim>(jump, time, Vec<3>::Zero())) return function;
   return [](double) { return Vec<3>(Vec<3>::Zero()); };
