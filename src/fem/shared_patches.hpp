@@ -10,13 +10,31 @@
 
 namespace itr {
 
-/// Patches that have one weight in each element, which is straight: what edits of a mesh carry on (docs/theory.md, "Patches
-/// under remeshing"). `patch_of` is empty; the part of a member is the number of its share.
+/// Integrals of a function over an element [m^Dim times its unit]: of itself, and times the last Dim barycentric coordinates
+/// less their means.
+template <int Dim>
+struct ElementMoments {
+  double whole = 0;
+  Vec<Dim> first = Vec<Dim>::Zero();
+};
+
+/// Patches whose weights in each element are constant or, where elements are turned about an axis, linear: what edits of a
+/// mesh carry on (docs/theory.md, "Patches under remeshing"). Elements are straight. `patch_of` is empty; the part of a
+/// member is the number of its share.
 template <int Dim>
 struct SharedPatches : VolumePatches<Dim> {
   struct Share {
     int patch;
-    double weight;
+    double weight;                     ///< mean over the element
+    Vec<Dim> lean = Vec<Dim>::Zero();  ///< derivatives by the last Dim barycentric coordinates; 0 where nothing is turned
+
+    double at(const std::array<double, Dim + 1>& barycentric) const {
+      double value = weight;
+      for (int k = 0; k < Dim; ++k) value += lean[k] * (barycentric[k + 1] - 1.0 / (Dim + 1));
+      return value;
+    }
+    /// The integral of the weight times a function by the integrals of this.
+    double integral(const ElementMoments<Dim>& of) const { return weight * of.whole + lean.dot(of.first); }
   };
   std::vector<std::size_t> first_share{0};  ///< by element, and the end
   std::vector<Share> shares;                ///< in elements of bodies with patches weights add up to 1

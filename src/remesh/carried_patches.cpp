@@ -2,6 +2,7 @@
 #include "remesh/carried_patches.hpp"
 
 #include <algorithm>
+#include <numbers>
 #include <utility>
 
 #include "energy/elastic/patched_volume.hpp"
@@ -14,25 +15,91 @@ namespace itr {
 
 namespace {
 
+/// Of J - 1. In a turned cell J R - R is linear: det F in the plane times r, less R.
 template <int Dim>
-double integral_of_change(const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
+ElementMoments<Dim> change_in(const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
   const auto& cell = mesh.cell(c);
   const auto u = [&](VertexId v) -> Vec<Dim> { return x.segment<Dim>(Dim * v) - mesh.rest(v); };
   Mat<Dim> edges;
   const Vec<Dim> first = u(cell[0]);
   for (int k = 0; k < Dim; ++k) edges.col(k) = u(cell[k + 1]) - first;
   const Mat<Dim> G = edges * mesh.inverse_rest_edges(c);
-  return mesh.volume(c) * (G.trace() + sum_of_minors(G));
+  const double change = G.trace() + sum_of_minors(G);
+  if (!mesh.is_axisymmetric()) return {mesh.volume(c) * change};
+  Vec<Dim + 1> f;
+  for (int k = 0; k <= Dim; ++k) f[k] = change * x[Dim * cell[k]] + u(cell[k])[0];
+  const double factor = 2 * std::numbers::pi * mesh.volume(c);
+  ElementMoments<Dim> moments{factor * f.mean()};
+  moments.first = factor / ((Dim + 1) * (Dim + 2)) * (f.template tail<Dim>().array() - f.mean());
+  return moments;
 }
 
-template <typename Shares>
-void add_share(int patch, double weight, Shares& shares) {
-  const auto same = std::ranges::find_if(shares, [&](const auto& share) { return share.patch == patch; });
-  if (same == shares.end())
-    shares.push_back({patch, weight});
-  else
-    same->weight += weight;
+/// A linear function of these values at corners.
+template <int Dim>
+typename SharedPatches<Dim>::Share linear_share(int patch, const Vec<Dim + 1>& at_corners) {
+  return {patch, at_corners.mean(), at_corners.template tail<Dim>().array() - at_corners[0]};
 }
+template <int Dim>
+Vec<Dim + 1> at_corners(const typename SharedPatches<Dim>::Share& share) {
+  Vec<Dim + 1> values;
+  values[0] = share.weight - share.lean.sum() / (Dim + 1);
+  values.template tail<Dim>() = share.lean.array() + values[0];
+  return values;
+}
+
+template <int Dim>
+Simplex<Dim> simplex_of(const Mesh<Dim>& mesh, CellId c) {
+  std::array<Vec<Dim>, Dim + 1> p;
+  for (int k = 0; k <= Dim; ++k) p[k] = mesh.rest(mesh.cell(c)[k]);
+  return Simplex<Dim>(p);
+}
+template <int Dim>
+Simplex<Dim> simplex_after(const Mesh<Dim>& mesh, const Edit<Dim>& edit, std::size_t i) {
+  std::array<Vec<Dim>, Dim + 1> p;
+  for (int k = 0; k <= Dim; ++k) p[k] = rest_after(mesh, edit, edit.inserted_cells[i].vertices[k]);
+  return Simplex<Dim>(p);
+}
+
+/// Means over a cell of weights on cells that cover it, or, where these are turned, the linear functions with the same
+/// integrals times linear functions: J R is one.
+template <int Dim>
+class ShareProjection {
+ public:
+  using Share = typename SharedPatches<Dim>::Share;
+
+  explicit ShareProjection(bool is_turned) : is_turned_(is_turned) {}
+  void add(const std::vector<Share>& shares, const OverlapIntegrals<Dim>& overlap) {
+    const double volume = overlap.volume();
+    covered_ += volume;
+    for (const Share& share : shares) {
+      const auto same = std::ranges::find(found_, share.patch, &Share::patch);
+      const std::size_t i = static_cast<std::size_t>(same - found_.begin());
+      if (same == found_.end()) {
+        found_.push_back({share.patch, 0});
+        moments_.push_back(Vec<Dim + 1>::Zero());
+      }
+      found_[i].weight += share.weight * volume;
+      if (is_turned_) moments_[i] += overlap.ab * at_corners<Dim>(share);
+    }
+  }
+  std::vector<Share> shares() {
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+      if (is_turned_) {
+        const Vec<Dim + 1> centred = moments_[i].array() - moments_[i].sum() / (Dim + 2);
+        found_[i] = linear_share<Dim>(found_[i].patch, (Dim + 1) * (Dim + 2) / covered_ * centred);
+      } else {
+        found_[i].weight /= covered_;
+      }
+    }
+    return std::move(found_);
+  }
+
+ private:
+  bool is_turned_;
+  double covered_ = 0;
+  std::vector<Share> found_;
+  std::vector<Vec<Dim + 1>> moments_;  ///< of these: integrals times shape functions of the cell
+};
 
 }  // namespace
 
@@ -42,7 +109,7 @@ bool any_averages_volume(const std::map<int, Material>& materials) {
 
 template <int Dim>
 CarriedPatches<Dim>::CarriedPatches(const Mesh<Dim>& mesh, const VectorX& x, const std::map<int, Material>& materials)
-    : shares_(mesh.cell_slots()), change_(mesh.cell_slots(), 0.0) {
+    : shares_(mesh.cell_slots()), change_(mesh.cell_slots()) {
   CellSet<Dim> cells = whole_mesh(mesh, {});
   add_patches(materials, cells);
   if (!cells.patches) return;
@@ -55,7 +122,7 @@ CarriedPatches<Dim>::CarriedPatches(const Mesh<Dim>& mesh, const VectorX& x, con
     const int patch = cells.patches->patch_of[e][VolumePatches<Dim>::kLeft];
     if (patch == kNone) continue;
     shares_[c] = {{patch, 1.0}};
-    change_[c] = integral_of_change(mesh, c, x);
+    change_[c] = change_in(mesh, c, x);
     add(c, 1, 0);
   }
 }
@@ -67,10 +134,27 @@ bool CarriedPatches<Dim>::act_in(std::span<const CellId> cells) const {
 
 template <int Dim>
 void CarriedPatches<Dim>::add(CellId c, double sign, unsigned commit) {
-  for (const auto& [patch, weight] : shares_[c]) {
-    total_[patch] += sign * weight * change_[c];
-    written_[patch] = commit;
+  for (const Share& share : shares_[c]) {
+    total_[share.patch] += sign * share.integral(change_[c]);
+    written_[share.patch] = commit;
   }
+}
+
+/// The weights in a half of a cell that a split makes.
+template <int Dim>
+typename CarriedPatches<Dim>::Shares CarriedPatches<Dim>::halved(const Mesh<Dim>& mesh, const Edit<Dim>& edit,
+                                                                 std::size_t i) const {
+  const CellId whole = edit.removed_cells[i / 2];
+  Shares shares = shares_[whole];
+  if (!mesh.is_axisymmetric() || shares.size() < 2) return shares;
+  const Simplex<Dim> before = simplex_of(mesh, whole), half = simplex_after(mesh, edit, i);
+  for (Share& share : shares) {
+    const Vec<Dim + 1> values = at_corners<Dim>(share);
+    Vec<Dim + 1> of_half;
+    for (int k = 0; k <= Dim; ++k) of_half[k] = before.barycentric(half.corners[k]).dot(values);
+    share = linear_share<Dim>(share.patch, of_half);
+  }
+  return shares;
 }
 
 template <int Dim>
@@ -80,29 +164,22 @@ std::vector<typename CarriedPatches<Dim>::Shares> CarriedPatches<Dim>::shares_af
   std::vector<Shares> after(edit.inserted_cells.size());
   if (!act_in(edit.removed_cells)) return after;
   if (edit.kind == Kind::split) {
-    for (std::size_t i = 0; i < after.size(); ++i) after[i] = shares_[edit.removed_cells[i / 2]];
+    for (std::size_t i = 0; i < after.size(); ++i) after[i] = halved(mesh, edit, i);
     return after;
   }
   std::vector<Simplex<Dim>> old_cells;
-  for (const CellId c : edit.removed_cells) {
-    std::array<Vec<Dim>, Dim + 1> p;
-    for (int k = 0; k <= Dim; ++k) p[k] = mesh.rest(mesh.cell(c)[k]);
-    old_cells.emplace_back(p);
-  }
+  for (const CellId c : edit.removed_cells) old_cells.push_back(simplex_of(mesh, c));
   for (std::size_t i = 0; i < after.size(); ++i) {
-    const auto& cell = edit.inserted_cells[i];
-    std::array<Vec<Dim>, Dim + 1> p;
-    for (int k = 0; k <= Dim; ++k) p[k] = rest_after(mesh, edit, cell.vertices[k]);
-    const Simplex<Dim> here(p);
+    const Simplex<Dim> here = simplex_after(mesh, edit, i);
+    ShareProjection<Dim> projection(mesh.is_axisymmetric());
     OverlapIntegrals<Dim> overlap;
-    double covered = 0;
     for (std::size_t j = 0; j < old_cells.size(); ++j) {
       const CellId c = edit.removed_cells[j];
-      if (mesh.body(c) != cell.body || shares_[c].empty() || !integrate_overlap(here, old_cells[j], overlap)) continue;
-      covered += overlap.volume();
-      for (const auto& [patch, weight] : shares_[c]) add_share(patch, weight * overlap.volume(), after[i]);
+      if (mesh.body(c) == edit.inserted_cells[i].body && !shares_[c].empty() &&
+          integrate_overlap(here, old_cells[j], overlap))
+        projection.add(shares_[c], overlap);
     }
-    for (Share& share : after[i]) share.weight /= covered;
+    after[i] = projection.shares();
   }
   return after;
 }
@@ -126,12 +203,12 @@ std::shared_ptr<const SharedPatches<Dim>> CarriedPatches<Dim>::in(const CellSet<
     patches->outside.push_back(total_[id]);
   }
   for (const CellId c : before)
-    for (const auto& [patch, weight] : shares_[c]) patches->outside[number(patch)] -= weight * change_[c];
+    for (const Share& share : shares_[c]) patches->outside[number(share.patch)] -= share.integral(change_[c]);
   std::size_t next = 0;
   for (std::size_t e = 0; e < cells.elements.size(); ++e) {
     const CellId c = cells.elements[e].cell;
-    for (const auto& [id, weight] : c == kNone ? inserted[next++] : shares_[c])
-      patches->shares.push_back({number(id), weight});
+    for (const Share& share : c == kNone ? inserted[next++] : shares_[c])
+      patches->shares.push_back({number(share.patch), share.weight, share.lean});
     patches->first_share.push_back(patches->shares.size());
   }
   patches->list_members(cells);
@@ -147,7 +224,7 @@ void CarriedPatches<Dim>::follow(const Mesh<Dim>& mesh, const Edit<Dim>& edit, s
     shares_[c].clear();
   }
   shares_.resize(mesh.cell_slots());
-  change_.resize(mesh.cell_slots(), 0);
+  change_.resize(mesh.cell_slots());
   for (std::size_t i = 0; i < new_cells.size(); ++i) shares_[new_cells[i]] = std::move(inserted[i]);
   std::vector<CellId> changed(new_cells.begin(), new_cells.end());
   for (const VertexId v : moved) {
@@ -159,7 +236,7 @@ void CarriedPatches<Dim>::follow(const Mesh<Dim>& mesh, const Edit<Dim>& edit, s
   for (const CellId c : changed) {
     if (shares_[c].empty()) continue;
     if (!std::ranges::count(new_cells, c)) add(c, -1, commit);
-    change_[c] = integral_of_change(mesh, c, x);
+    change_[c] = change_in(mesh, c, x);
     add(c, 1, commit);
   }
 }

@@ -336,7 +336,7 @@ static bool carries_patches(const Node& root, int dimension) {
   if (!remesh["enabled"].boolean(false)) return true;
   if (dimension == 3 || (root.has("time") && !root["time"]["quasistatic"].boolean(false))) return false;
   if (!conditions["pressure_boundary"].items().empty() || !conditions["pressure_cavity"].items().empty()) return false;
-  return (!space["discr_order"].exists() || space["discr_order"].json() == 1) && !is_axisymmetric(root) &&
+  return (!space["discr_order"].exists() || space["discr_order"].json() == 1) &&
          !remesh["curve"]["enabled"].boolean(false) && !remesh["sizing_field"]["enabled"].boolean(false) &&
          !(remesh["screening"].exists() && remesh["screening"].json() == "energy-percentile");
 }

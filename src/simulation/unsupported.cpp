@@ -137,10 +137,6 @@ constexpr Check<Dim> kChecks[] = {
     {{"/materials/*/volume",
       "\"patches\" of quadratic elements where the mesh changes: edits carry constants in cells only"},
      [](const Setup<Dim>& setup, bool curves) { return setup.remesh.enabled && curves && has_patches(setup); }},
-    {{"/materials/*/volume", "\"patches\" where the mesh of axisymmetric bodies changes"},
-     [](const Setup<Dim>& setup, bool) {
-       return setup.remesh.enabled && setup.mesh.is_axisymmetric() && has_patches(setup);
-     }},
     {{"/materials/*/volume", "\"patches\" where a sizing field or energies in cells choose the edits"},
      [](const Setup<Dim>& setup, bool) {
        return setup.remesh.enabled && has_patches(setup) &&

@@ -47,7 +47,7 @@ PatchedLaw law_in(const PatchPressures<Dim>& pressures, const ElasticModuli& mod
   if (!shared) return pressures.in_straight(moduli, e);
   PatchedLaw law(moduli);
   double pressure = 0;
-  for (const auto& [patch, weight] : shared->shares_of(e)) pressure += weight * pressures.values[patch];
+  for (const auto& share : shared->shares_of(e)) pressure += share.weight * pressures.values[share.patch];
   if (!shared->shares_of(e).empty()) law.set_pressure(pressure);
   return law;
 }

@@ -7,7 +7,6 @@
 #include "core/parallel_reduce.hpp"
 #include "energy/energy.hpp"
 #include "fem/hessian_sink.hpp"
-#include "fem/shared_patches.hpp"
 #include "fem/volume_patches.hpp"
 #include "geometry/cofactors.hpp"
 #include "strain.hpp"
@@ -51,7 +50,9 @@ std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) cons
   constexpr int kParts = VolumePatches<Dim>::kParts;
   const VolumePatches<Dim>& patches = *cells_.patches;
   const std::size_t straight = cells_.straight().size();
-  std::vector<std::array<double, kParts>> of_element(cells_.elements.size());  // integrals of w (J - 1)
+  const auto* shared = SharedPatches<Dim>::of(&patches);
+  // Integrals of w (J - 1), or its moments, the whole last.
+  std::vector<std::array<double, kParts>> of_element(cells_.elements.size());
   parallel_blocks(of_element.size(), kElements, [&](std::size_t begin, std::size_t end) {
     for (std::size_t e = begin; e < end; ++e) {
       const auto& element = cells_.elements[e];
@@ -65,6 +66,12 @@ std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) cons
       const NodalDisplacements<Dim> displacements(element, u);
       for_each_site<Dim>(cells_, element, rule_of_(e - straight), [&](std::size_t, const auto& site) {
         const double change = volume_change(site.displacement_gradient(displacements).G);
+        if (shared) {
+          of_element[e].back() += site.weight(1) * change;
+          for (int k = 0; k < Dim; ++k)
+            of_element[e][k] += site.weight(1) * (site.point.weights[k + 1] - 1.0 / (Dim + 1)) * change;
+          return;
+        }
         for (int part = 0; part < kParts; ++part)
           if (patches.patch_of[e][part] != kNone)
             of_element[e][part] += site.weight(1) * patches.weight(static_cast<int>(e), part, site.point.weights) * change;
@@ -72,10 +79,11 @@ std::vector<double> PatchedVolume<Dim>::changes(const Displacement<Dim>& u) cons
     }
   });
   std::vector<double> changes(patches.count());
-  if (const auto* shared = SharedPatches<Dim>::of(&patches)) {  // of a trial, which is small
+  if (shared) {  // of a trial, which is small
     for (std::size_t i = 0; i < changes.size(); ++i) {
       double sum = shared->outside[i];
-      for (const auto& [e, share] : patches.members_of(i)) sum += shared->shares[share].weight * of_element[e].back();
+      for (const auto& [e, share] : patches.members_of(i))
+        sum += shared->shares[share].integral({of_element[e].back(), Eigen::Map<const Vec<Dim>>(of_element[e].data())});
       changes[i] = sum / patches.volume[i];
     }
     return changes;
@@ -138,7 +146,9 @@ VectorX PatchedVolume<Dim>::gradient_of(std::size_t patch, ConstVectorView x) co
     Nodal<Dim> forces = Nodal<Dim>::Zero();
     for_each_site<Dim>(cells_, element, rule_of_(static_cast<std::size_t>(e) - straight),
                        [&, e = e, part = part](std::size_t, const auto& site) {
-                         const double weight = site.weight(1) * patches.weight(e, part, site.point.weights);
+                         const double of_part = shared ? shared->shares[part].at(site.point.weights)
+                                                       : patches.weight(e, part, site.point.weights);
+                         const double weight = site.weight(1) * of_part;
                          site.add_forces(weight, cofactors(site.deformation_gradient(positions)), forces);
                        });
     for (int k = 0; k < kQuadraticNodes<Dim>; ++k) add(of_element[k], forces.col(k));

@@ -15,6 +15,7 @@
 #include "fem/cell_set.hpp"
 #include "fem/displacement.hpp"
 #include "fem/quadrature.hpp"
+#include "fem/shared_patches.hpp"
 
 namespace itr {
 
@@ -39,6 +40,10 @@ struct PatchPressures {
   /// At a point of an element, by its number in the cells [Pa].
   double at(std::size_t element, const std::array<double, Dim + 1>& weights) const {
     double sum = 0;
+    if (const auto* shared = SharedPatches<Dim>::of(patches)) {
+      for (const auto& share : shared->shares_of(element)) sum += share.at(weights) * values[share.patch];
+      return sum;
+    }
     for (int part = 0; part < VolumePatches<Dim>::kParts; ++part)
       if (const int patch = patches->patch_of[element][part]; patch != kNone)
         sum += patches->weight(static_cast<int>(element), part, weights) * values[patch];
