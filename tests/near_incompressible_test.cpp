@@ -93,6 +93,30 @@ TEST(NearIncompressible, RemeshedCookDoesNotLock) {
   EXPECT_LT(error, 0.5 * locked);
 }
 
+/// A block that a wall stops: splits in its shock gain most by what the patches of the coarse mesh leave free, which new
+/// ones take back: 725 vertices, and energies that rise by 50 %. They are made only as far as no rise is expected.
+TEST(NearIncompressible, NewPatchesTakeBackLittleInShocks) {
+  auto setup = cook(1, 1, 0.495, VolumeForm::patches);
+  setup.mesh = make_square(6, 1);
+  setup.neumann.clear();
+  setup.dirichlet[0].tag = 1;
+  setup.materials[1].density = 1;
+  setup.initial_velocity.push_back({1, [](const Vec<2>&, double) { return Vec<2>(-8, -8); }});
+  setup.time = {.dt = 0.001, .steps = 4};
+  setup.remesh.enabled = true;
+  setup.remesh.split.acceptance_tolerance = 5e-4;
+  linear::Registry registry;
+  Simulation<2> simulation(setup, registry);
+  StepReport report;
+  while (!simulation.finished()) {
+    report = advance(simulation).report;
+    EXPECT_EQ(report.reverted_remeshes, 0);
+    EXPECT_LT(report.energy.total, 1.15 * report.energy_before_remesh) << report.step;
+  }
+  EXPECT_GT(report.vertices, 80);
+  EXPECT_LT(report.vertices, 250);
+}
+
 /// A square whose sides are held, turned by a force that is a curl: full orders, and errors of compressible bodies.
 TEST(NearIncompressible, SmoothSolutionsConvergeAtFullOrder) {
   const auto energy = [](int n, int order, double nu, VolumeForm volume) {
@@ -327,7 +351,7 @@ TEST_F(SceneTest, NearlyIncompressibleBodiesAverageTheirVolume) {
   EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}), {{"axisymmetric", true},
                                                              {"time", {{"tend", 1}, {"dt", 1}, {"quasistatic", true}}},
                                                              {"space", {{"remesh", {{"enabled", true}}}}}}),
-            kPointwise);
+            kPatches);
   EXPECT_EQ(form(rubber(0.49, {{"plane_strain", nullptr}}), {{"axisymmetric", true}}), kPatches);
   for (const auto& [order, expected] : {std::pair{1, kPatches}, {2, kPointwise}}) {  // of tetrahedra
     json scene = square({{"materials", rubber(0.49, {{"plane_strain", nullptr}})}, {"space", {{"discr_order", order}}}});

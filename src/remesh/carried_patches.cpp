@@ -2,6 +2,7 @@
 #include "remesh/carried_patches.hpp"
 
 #include <algorithm>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -14,6 +15,15 @@
 namespace itr {
 
 namespace {
+
+/// Of a function that times the radius is linear, with these products at corners.
+template <int Dim>
+ElementMoments<Dim> turned_moments(const Vec<Dim + 1>& f, double area) {
+  const double factor = 2 * std::numbers::pi * area;
+  ElementMoments<Dim> moments{factor * f.mean()};
+  moments.first = factor / ((Dim + 1) * (Dim + 2)) * (f.template tail<Dim>().array() - f.mean());
+  return moments;
+}
 
 /// Of J - 1. In a turned cell J R - R is linear: det F in the plane times r, less R.
 template <int Dim>
@@ -28,10 +38,16 @@ ElementMoments<Dim> change_in(const Mesh<Dim>& mesh, CellId c, const VectorX& x)
   if (!mesh.is_axisymmetric()) return {mesh.volume(c) * change};
   Vec<Dim + 1> f;
   for (int k = 0; k <= Dim; ++k) f[k] = change * x[Dim * cell[k]] + u(cell[k])[0];
-  const double factor = 2 * std::numbers::pi * mesh.volume(c);
-  ElementMoments<Dim> moments{factor * f.mean()};
-  moments.first = factor / ((Dim + 1) * (Dim + 2)) * (f.template tail<Dim>().array() - f.mean());
-  return moments;
+  return turned_moments<Dim>(f, mesh.volume(c));
+}
+
+/// Of 1.
+template <int Dim>
+ElementMoments<Dim> size_of(const Mesh<Dim>& mesh, CellId c) {
+  if (!mesh.is_axisymmetric()) return {mesh.volume(c)};
+  Vec<Dim + 1> R;
+  for (int k = 0; k <= Dim; ++k) R[k] = mesh.rest(mesh.cell(c)[k])[0];
+  return turned_moments<Dim>(R, mesh.volume(c));
 }
 
 /// A linear function of these values at corners.
@@ -109,7 +125,7 @@ bool any_averages_volume(const std::map<int, Material>& materials) {
 
 template <int Dim>
 CarriedPatches<Dim>::CarriedPatches(const Mesh<Dim>& mesh, const VectorX& x, const std::map<int, Material>& materials)
-    : shares_(mesh.cell_slots()), change_(mesh.cell_slots()) {
+    : shares_(mesh.cell_slots()), change_(mesh.cell_slots()), size_(mesh.cell_slots()) {
   CellSet<Dim> cells = whole_mesh(mesh, {});
   add_patches(materials, cells);
   if (!cells.patches) return;
@@ -123,6 +139,7 @@ CarriedPatches<Dim>::CarriedPatches(const Mesh<Dim>& mesh, const VectorX& x, con
     if (patch == kNone) continue;
     shares_[c] = {{patch, 1.0}};
     change_[c] = change_in(mesh, c, x);
+    size_[c] = size_of(mesh, c);
     add(c, 1, 0);
   }
 }
@@ -187,28 +204,44 @@ std::vector<typename CarriedPatches<Dim>::Shares> CarriedPatches<Dim>::shares_af
 template <int Dim>
 std::shared_ptr<const SharedPatches<Dim>> CarriedPatches<Dim>::in(const CellSet<Dim>& cells,
                                                                   const std::vector<Shares>& inserted,
-                                                                  std::span<const CellId> before) const {
-  std::vector<int> ids;  // of patches, ascending
+                                                                  std::span<const CellId> before,
+                                                                  std::span<const CellId> star) const {
+  std::map<int, int> number;  // by patch
   for (const CellId c : before)
-    for (const Share& share : shares_[c]) ids.push_back(share.patch);
-  if (ids.empty()) return nullptr;
-  std::ranges::sort(ids);
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  const auto number = [&](int id) { return static_cast<int>(std::ranges::lower_bound(ids, id) - ids.begin()); };
-
+    for (const Share& share : shares_[c]) number[share.patch] = 0;
+  if (number.empty()) return nullptr;
+  std::map<int, double> left, of_star;  // volumes by patch, and by body
+  for (const auto& [id, _] : number) left[id] = volume_[id];
+  for (const CellId c : star)
+    for (const Share& share : shares_[c]) {
+      const double volume = share.integral(size_[c]);
+      left[share.patch] -= volume;
+      of_star[body_[share.patch]] += volume;
+    }
   const auto patches = std::make_shared<SharedPatches<Dim>>();
-  for (const int id : ids) {
-    patches->body.push_back(body_[id]);
-    patches->volume.push_back(volume_[id]);
-    patches->outside.push_back(total_[id]);
-  }
+  const auto add_patch = [&](int body, double volume, double outside) {
+    patches->body.push_back(body);
+    patches->volume.push_back(volume);
+    patches->outside.push_back(outside);
+    return static_cast<int>(patches->body.size()) - 1;
+  };
+  constexpr double kNothing = 1e-9;  // of a patch
+  std::map<int, int> new_of;
+  for (auto& [id, at] : number) at = left[id] > kNothing * volume_[id] ? add_patch(body_[id], left[id], total_[id]) : kNone;
+  for (const auto& [body, volume] : of_star) new_of[body] = add_patch(body, volume, 0);
   for (const CellId c : before)
-    for (const Share& share : shares_[c]) patches->outside[number(share.patch)] -= share.integral(change_[c]);
+    for (const Share& share : shares_[c])
+      if (const int at = number.at(share.patch); at != kNone) patches->outside[at] -= share.integral(change_[c]);
   std::size_t next = 0;
   for (std::size_t e = 0; e < cells.elements.size(); ++e) {
     const CellId c = cells.elements[e].cell;
-    for (const Share& share : c == kNone ? inserted[next++] : shares_[c])
-      patches->shares.push_back({number(share.patch), share.weight, share.lean});
+    const Shares& of_cell = c == kNone ? inserted[next++] : shares_[c];
+    const bool is_of_star = !star.empty() && (c == kNone || std::ranges::count(star, c) > 0);
+    if (is_of_star && !of_cell.empty())
+      patches->shares.push_back({new_of.at(cells.elements[e].body), 1});
+    else
+      for (const Share& share : of_cell)
+        if (const int at = number.at(share.patch); at != kNone) patches->shares.push_back({at, share.weight, share.lean});
     patches->first_share.push_back(patches->shares.size());
   }
   patches->list_members(cells);
@@ -225,6 +258,7 @@ void CarriedPatches<Dim>::follow(const Mesh<Dim>& mesh, const Edit<Dim>& edit, s
   }
   shares_.resize(mesh.cell_slots());
   change_.resize(mesh.cell_slots());
+  size_.resize(mesh.cell_slots());
   for (std::size_t i = 0; i < new_cells.size(); ++i) shares_[new_cells[i]] = std::move(inserted[i]);
   std::vector<CellId> changed(new_cells.begin(), new_cells.end());
   for (const VertexId v : moved) {
@@ -237,6 +271,7 @@ void CarriedPatches<Dim>::follow(const Mesh<Dim>& mesh, const Edit<Dim>& edit, s
     if (shares_[c].empty()) continue;
     if (!std::ranges::count(new_cells, c)) add(c, -1, commit);
     change_[c] = change_in(mesh, c, x);
+    size_[c] = size_of(mesh, c);
     add(c, 1, commit);
   }
 }

@@ -227,7 +227,10 @@ template <int Dim>
 void LocalProblem<Dim>::add_patches(std::span<const CellId> patch) {
   const CarriedPatches<Dim>& carried = *state_.patches;
   using Shares = typename CarriedPatches<Dim>::Shares;
-  cells_.patches = carried.in(cells_, is_after_ ? carried.shares_after(mesh_, edit_) : std::vector<Shares>(), patch);
+  const std::vector<Shares> inserted = is_after_ ? carried.shares_after(mesh_, edit_) : std::vector<Shares>();
+  const std::span<const CellId> star =
+      state_.cuts_star ? std::span<const CellId>(edit_.removed_cells) : std::span<const CellId>();
+  cells_.patches = carried.in(cells_, inserted, patch, star);
 }
 
 /// Makes the vertices of a simplex local, and finds its curved edges.

@@ -35,6 +35,7 @@ struct RemeshState {
   const SurfaceIndex<Dim>& surface;  ///< at fields.x
   HistoryRule history;
   const CarriedPatches<Dim>* patches = nullptr;  ///< null: no body averages its volume
+  bool cuts_star = false;                        ///< the cells of the edit are patches of their own
 };
 
 /// A vertex of a local problem, or the node of a curved edge.

@@ -78,6 +78,30 @@ double gain_of_vertex(const RemeshState<Dim>& state, const Edit<Dim>& edit, Loca
   return found.gain;
 }
 
+/// Patches of volume by vertex on random meshes: of 7 triangles, of 25 tetrahedra (docs/theory.md, "Patches under
+/// remeshing").
+template <int Dim>
+inline constexpr double kPatchesPerVertex = Dim == 2 ? 2.0 / 7 : 2.0 / 9;
+
+/// Whether a split gains more than the patches that it brings to the next solve are expected to take back. One of its own
+/// takes what it does on the relaxed patch. Only with inertia, where what patches leave free does not come to rest.
+template <int Dim>
+bool pays_for_patches(const RemeshState<Dim>& state, const Edit<Dim>& edit, const LocalRelaxationOptions& local,
+                      LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
+  const bool brings_patches = edit.kind == Edit<Dim>::Kind::split && state.context.has_inertia;
+  if (!brings_patches || !state.patches || !state.patches->act_in(edit.removed_cells)) return true;
+  RemeshState<Dim> finer = state;
+  finer.cuts_star = true;
+  const auto energy = [&](const RemeshState<Dim>& by, bool is_after) {
+    LocalProblem<Dim> problem(by, verdict.patch, edit, is_after, scratch);
+    verdict.surface_read.include(problem.surface_read());
+    const int effort = problem.touches_contact() ? local.max_contact_iterations : local.max_iterations;
+    return problem.has_unknowns() ? problem.relax(effort).energy : problem.value();
+  };
+  const double before = energy(state, false), after = energy(state, true), ends = energy(finer, true);
+  return before - after >= kPatchesPerVertex<Dim> * (ends - after);
+}
+
 template <int Dim>
 void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Dim>& edit, const TrialOptions& options,
              LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
@@ -93,6 +117,7 @@ void preview(const RemeshState<Dim>& state, const Gate<Dim>& gate, const Edit<Di
   };
   // Relaxes an edit that gains enough, which may still make a distorted cell.
   const auto finish = [&](LocalProblem<Dim>& after) {
+    if (!pays_for_patches(state, edit, options.local, scratch, verdict)) return Refusal::energy;
     if (after.has_unknowns()) after.relax(kIterationsAfterAcceptance);
     if (edit.kind == Edit<Dim>::Kind::curve && after.distorts()) return Refusal::shape;
     after.get_positions(verdict.positions);
