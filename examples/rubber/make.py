@@ -9,6 +9,7 @@ With --refine edges are 2^K times shorter than in the committed meshes. The lip 
 
 import argparse
 import dataclasses
+import itertools
 import json
 import pathlib
 import subprocess
@@ -26,6 +27,7 @@ OGDEN = {"type": "Ogden", "mus": [0.63, 0.0012, -0.01], "alphas": [1.3, 5, -2], 
 YEOH = {"type": "Yeoh", "C": [0.31237, 5.4257e-4, 6.962e-5], "K": 1000}
 BUSHING = {"type": "NeoHookean", "E": 1.8, "nu": 0.4997}
 CORD = 3.53
+SECTOR = np.pi / 12  # of the boot
 FLUID = "0.6 * min(max(t - 1, 0), 1)"
 # Edge, lip and garter side of the shaft seal, its membrane, and the rim that is bonded to a metal ring: r, z, edges by h.
 LIP = [(24.4, 0, 0.3), (25.6, -1.4), (27.2, -1.6), (28.2, -1), (28.6, 3.4), (29.2, 5), (32, 5), (32, 7), (28.2, 7),
@@ -64,6 +66,25 @@ def boot(shares):
     on, way = (np.column_stack([np.interp(at, place, v[:, c]) for c in (0, 1)]) for v in (middle, tangent))
     normal = np.column_stack([way[:, 1], -way[:, 0]]) / np.linalg.norm(way, axis=1)[:, None]
     return on + 1.4 * (shares[:, :1] - 0.5) * normal
+
+
+def sector(place, along):
+    """A wall in a sector about the z axis, one layer of boxes that are two around: each is cut into six tetrahedra around a
+    diagonal, as the mirror image of those beside it."""
+    counts = (1, 2, along)
+    s, turn, t = (v.ravel() for v in np.meshgrid(*(np.linspace(0, 1, n + 1) for n in counts), indexing="ij"))
+    r, z = place(np.column_stack([s, t])).T
+    points = np.column_stack([r * np.cos(SECTOR * turn), r * np.sin(SECTOR * turn), z])
+    ids, cells = np.arange(len(points)).reshape([n + 1 for n in counts]), []
+    for box in np.ndindex(*counts):
+        for axes in itertools.permutations(np.eye(3, dtype=int)):
+            corners = np.cumsum([(0, 0, 0), *axes], axis=0) ^ (np.array(box) % 2)
+            cells.append([ids[tuple(box + corner)] for corner in corners])
+    cells = np.array(cells)
+    a, b, c, d = (points[cells[:, k]] for k in range(4))
+    is_turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
+    cells[is_turned] = cells[is_turned][:, [1, 0, 2, 3]]
+    return points, cells
 
 
 def half_disc(radius, h):
@@ -112,6 +133,7 @@ MESHES = {  # edges of the committed mesh, and how one of others is made
     "cord": (0.3, lambda h: half_disc(CORD / 2, h)),
     "leg": (0.4, lambda h: mapped(leg, 2.235, 9, h)),
     "boot": (0.8, lambda h: mapped(boot, 1.4, 90, h)),
+    "boot_sector": (1.6, lambda h: sector(boot, round(90 / h))),
     "lip": (0.5, lambda h: polygon(LIP, h)),
 }
 LINES = {  # obstacles
@@ -144,6 +166,16 @@ def quasistatic(steps, tend=1):
 
 def selected(*rules):
     return {"surface_selection": [{"id": k + 1, **rule} for k, rule in enumerate(rules)]}
+
+
+def mirror_normal():
+    return np.array([-np.sin(SECTOR), np.cos(SECTOR), 0])
+
+
+def mirror_stiffness(stiffness):
+    """By area, across the plane; hardly any along it."""
+    n = mirror_normal()
+    return stiffness * np.outer(n, n) + 1e-9 * np.eye(3)
 
 
 CIRCLES = selected(*({"center": [0, 0], "radius": r} for r in (15, 21)))  # 1 the pin's, 2 the sleeve's
@@ -226,6 +258,19 @@ PARTS = {
         "materials": OGDEN,
         "contact": {"enabled": True},
         "boundary_conditions": {"dirichlet_boundary": [held(1, 0, "25 * t"), held(2, 0, 0)]},
+        "time": quasistatic(10),
+        "output": {"forces": [{"name": "shaft", "surfaces": 1}]},
+    }),
+    # A 24th of it in space. Springs that resist motion across a plane make this a mirror, as the held side y = 0 is one.
+    "boot_sector": Part("boot_sector", selected(
+        {"box": [[0, 0, -1], [40, 40, 1e-3]]}, {"box": [[0, 0, 59.999], [40, 40, 61]]}, {"box": [[0, -1, 0], [40, 1e-3, 60]]},
+        {"normal": mirror_normal().tolist(), "point": [0, 0, 0]}), {
+        "materials": {**OGDEN, "volume": "patches"},
+        "space": {"discr_order": 2},
+        "contact": {"enabled": True},
+        "boundary_conditions": {"dirichlet_boundary": [held(1, 0, 0, "25 * t"), held(2, 0, 0, 0),
+                                                       {**held(3, 0, 0, 0), "dimension": [False, True, False]}]},
+        "springs": [{"id": 4, "stiffness_by_area": mirror_stiffness(3000).tolist()}],
         "time": quasistatic(10),
         "output": {"forces": [{"name": "shaft", "surfaces": 1}]},
     }),

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs each scene on three meshes to its end, certifies it, and compares a result with a reference.
+"""Runs each scene on three meshes (the boot's sector on two) to its end, certifies it, and compares a result with a reference.
 
 usage: study.py [--itr itr] [--runs DIR] [--keep] [--ccx] [--pictures] [SCENE...]
 
 Writes study/SCENE.csv, a row a mesh, and the table of README.md from all of these. The reference is a closed form; or CalculiX
 (--ccx runs it again, else the value stands in study/references.json); or a finer mesh, or quadratic elements on the second one.
---pictures draws the coarsest runs: rubber.png.
+--pictures draws the coarsest runs: rubber.png and boot_sector.png.
 """
 
 import argparse
@@ -58,6 +58,11 @@ def first_stiffness(run):
     return row["reaction_x"] / (3 * row["t"])
 
 
+def whole(value):
+    """Of the boot, by that of its sector."""
+    return lambda run: 2 * np.pi / make.SECTOR * value(run)
+
+
 def sealing_margin(run):
     """Peak pressure on the lid less that of the fluid."""
     with h5py.File(sorted((run / "frames").glob("*.h5"))[-1]) as file:
@@ -77,6 +82,7 @@ class Case:
     unit: str
     value: object          # of a run's folder
     reference: object      # a number, how a finer run is made, or a function of a folder that runs CalculiX
+    levels: int = LEVELS
 
     def source(self):
         return self.reference if isinstance(self.reference, str) else "CalculiX" if callable(self.reference) else "closed form"
@@ -101,6 +107,7 @@ def calculix_of(name, place, counts, moves):
 
 
 LEFT, RIGHT, BOTTOM, TOP = (0, 0), (0, 1), (1, 0), (1, 1)
+BOOT = calculix_of("boot", make.boot, (2, 80), [(BOTTOM, (0, 25)), (TOP, (0, 0))])
 TOP_FORCE = largest("top", "reaction_y", -1)
 CASES = {
     "shear": Case("force at 100 % shear", "N/mm", last("plate", "reaction_x"), sheared()),
@@ -111,8 +118,8 @@ CASES = {
     "oring": Case("peak contact pressure less the fluid's", "MPa", sealing_margin, "a finer mesh"),
     "seal_ogden": Case("largest force of the half", "N/mm", TOP_FORCE, "quadratic elements"),
     "seal_yeoh": Case("largest force of the half", "N/mm", TOP_FORCE, "quadratic elements"),
-    "boot": Case("force at 25 mm", "N", last("shaft", "reaction_y"),
-                 calculix_of("boot", make.boot, (2, 80), [(BOTTOM, (0, 25)), (TOP, (0, 0))])),
+    "boot": Case("force at 25 mm", "N", last("shaft", "reaction_y"), BOOT),
+    "boot_sector": Case("force of the whole boot at 25 mm", "N", whole(last("shaft", "reaction_z")), BOOT, levels=2),
     "lip_seal": Case("radial force on the shaft", "N", last("shaft", "contact_x", -1), "quadratic elements"),
 }
 
@@ -146,7 +153,7 @@ def reference(name, case, options, folder):
 
 def study(name, options):
     case, results = CASES[name], []
-    for level in range(LEVELS):
+    for level in range(case.levels):
         folder = options.runs / str(level)
         make.write(folder, [name], level)
         result = options.runs / f"{name}-{level}"
@@ -164,14 +171,20 @@ def study(name, options):
     print((STUDY / f"{name}.csv").read_text())
 
 
+def draw_end(run, path):
+    frame = max(int(frame.stem) for frame in (run / "frames").glob("*.h5"))
+    subprocess.run([sys.executable, HERE.parent / "render.py", run, "-o", path, "--frames", str(frame)], check=True)
+
+
 def draw(runs):
-    """The last frames of the coarsest runs, in one picture."""
+    """The last frames of the coarsest runs: those of plane sections in one picture."""
+    draw_end(runs / "boot_sector-0", HERE / "boot_sector.png")
     pictures = []
     for name in CASES:
-        frame = max(int(path.stem) for path in (runs / f"{name}-0" / "frames").glob("*.h5"))
+        if name == "boot_sector":
+            continue
         path = runs / f"{name}.png"
-        subprocess.run([sys.executable, HERE.parent / "render.py", runs / f"{name}-0", "-o", path, "--frames", str(frame)],
-                       check=True)
+        draw_end(runs / f"{name}-0", path)
         with Image.open(path) as picture:
             scale = min(HEIGHT / picture.height, 2 * HEIGHT / picture.width)
             pictures.append(picture.convert("RGB").resize((round(picture.width * scale), round(picture.height * scale))))

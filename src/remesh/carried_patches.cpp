@@ -16,7 +16,7 @@ namespace itr {
 
 namespace {
 
-/// Of a function that times the radius is linear, with these products at corners.
+/// Moments of a function that times the radius is linear, with these products at corners.
 template <int Dim>
 ElementMoments<Dim> turned_moments(const Vec<Dim + 1>& f, double area) {
   const double factor = 2 * std::numbers::pi * area;
@@ -25,7 +25,7 @@ ElementMoments<Dim> turned_moments(const Vec<Dim + 1>& f, double area) {
   return moments;
 }
 
-/// Of J - 1. In a turned cell J R - R is linear: det F in the plane times r, less R.
+/// Moments of J - 1. In a turned cell J R - R is linear: det F in the plane times r, less R.
 template <int Dim>
 ElementMoments<Dim> change_in(const Mesh<Dim>& mesh, CellId c, const VectorX& x) {
   const auto& cell = mesh.cell(c);
@@ -41,7 +41,7 @@ ElementMoments<Dim> change_in(const Mesh<Dim>& mesh, CellId c, const VectorX& x)
   return turned_moments<Dim>(f, mesh.volume(c));
 }
 
-/// Of 1.
+/// Moments of 1.
 template <int Dim>
 ElementMoments<Dim> size_of(const Mesh<Dim>& mesh, CellId c) {
   if (!mesh.is_axisymmetric()) return {mesh.volume(c)};

@@ -84,12 +84,13 @@ template <int Dim>
 inline constexpr double kPatchesPerVertex = Dim == 2 ? 2.0 / 7 : 2.0 / 9;
 
 /// Whether a split gains more than the patches that it brings to the next solve are expected to take back. One of its own
-/// takes what it does on the relaxed patch. Only with inertia, where what patches leave free does not come to rest.
+/// takes what it does on the relaxed patch. Asked with inertia, and under pressure, which is lagged.
 template <int Dim>
 bool pays_for_patches(const RemeshState<Dim>& state, const Edit<Dim>& edit, const LocalRelaxationOptions& local,
                       LocalScratch<Dim>& scratch, Verdict<Dim>& verdict) {
-  const bool brings_patches = edit.kind == Edit<Dim>::Kind::split && state.context.has_inertia;
-  if (!brings_patches || !state.patches || !state.patches->act_in(edit.removed_cells)) return true;
+  const bool is_asked = state.context.has_inertia || !state.context.loads.pressures.empty();
+  if (!is_asked || edit.kind != Edit<Dim>::Kind::split || !state.patches || !state.patches->act_in(edit.removed_cells))
+    return true;
   RemeshState<Dim> finer = state;
   finer.cuts_star = true;
   const auto energy = [&](const RemeshState<Dim>& by, bool is_after) {
