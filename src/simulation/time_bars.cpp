@@ -11,7 +11,7 @@ namespace {
 /// Of the mechanical energy that an impact may take: motions after a larger one depend on when it was.
 constexpr double kLostByImpact = 1e-3;
 constexpr double kRoundOff = 1e-16;  ///< of the mechanical energy
-/// What leading terms tell: errors of so many radians a step, which have put oscillations off by so many radians.
+/// Errors that leading terms tell: of so many radians a step, which have put oscillations off by so many radians.
 struct Slow {
   double fastest, most_turn;
 };
@@ -78,7 +78,7 @@ void TimeBars<Dim>::judge(const StepSetup<Dim>& setup, const History& history, c
   };
   knows_displacements_ = knows_forces_ = true;
   if (kinetic <= 2 * h * h * kRoundOff * energy_) return;
-  // What leading terms do not tell any more may be damped in the solution: the error stays.
+  // Errors that leading terms do not tell any more may be damped in the solution, and yet stay.
   const auto knows = [](bool is_told, double size, double& untold) {
     if (!is_told) untold = std::max(untold, size);
     return is_told && size >= untold;

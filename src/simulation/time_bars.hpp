@@ -19,9 +19,9 @@ class TimeBars {
  public:
   /// Maps M e to (M + alpha h^2 K)^-1 M e; empty where that fails.
   using Filter = std::function<VectorX(const VectorX& momentum)>;
-  /// What the step to x and those before have put its equations off by: `change` is zero where nothing is known, and where
-  /// solutions do not depend on steps. Local errors are filtered by the step's own matrix: motion that is faster than a step
-  /// has none that could be told.
+  /// Finds by how much the step to x and those before put its equations off: `change` is zero where nothing is known, and
+  /// where solutions do not depend on steps. Local errors are filtered by the step's own matrix: motion that is faster than
+  /// a step has none that could be told.
   void find(const StepSetup<Dim>& setup, const State<Dim>& state, StepProblem<Dim>& problem, const VectorX& x,
             const Filter& filter, SourceChange& change);
   /// Judges `motion`, the errors of the positions, and keeps what the step leaves to the next.
