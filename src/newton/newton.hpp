@@ -45,7 +45,7 @@ class NewtonSystem {
   /// only what the matrix is is found out.
   virtual linear::SystemReport solve(const Shift& shift, ConstVectorView rhs, const linear::Asked& asked,
                                      VectorView solution);
-  /// The same with Hessian + shift + U U^T, U of a few columns, which is never assembled.
+  /// Solves the system with U U^T beside Hessian + shift, U of a few columns, which is never assembled.
   virtual linear::SystemReport solve_beside(const MatrixX& U, const Shift& shift, ConstVectorView rhs,
                                             const linear::Asked& asked, VectorView solution);
   /// Factorises Hessian + shift.

@@ -8,7 +8,7 @@
 namespace itr {
 
 namespace {
-/// Of the mechanical energy that an impact may take: motions after a larger one depend on when it was.
+/// Part of the mechanical energy that an impact may take: motions after a larger one depend on when it was.
 constexpr double kLostByImpact = 1e-3;
 constexpr double kRoundOff = 1e-16;  ///< of the mechanical energy
 /// Errors that leading terms tell: of so many radians a step, which have put oscillations off by so many radians.
