@@ -37,7 +37,7 @@ class LowRankCorrection {
     set_columns(U, std::move(Z));
     return true;
   }
-  /// Of Z = K^-1 U.
+  /// Takes Z = K^-1 U as it is.
   void set_columns(const MatrixX& U, MatrixX Z) {
     Z_ = std::move(Z);
     U_ = U;
