@@ -76,8 +76,7 @@ class TimeIntegrator {
   double error_constant(const History& history) const;
   /// Whether local_error knows it: not of BDF from order 3 on, nor of Newmark with damping.
   bool knows_local_error(const History& history) const;
-  /// The part of x-hat that a step's local error adds: exact motions fulfil the formulas of the step up to minus its local
-  /// error.
+  /// The part of x-hat by a step's local error: exact motions fulfil the formulas of the step up to minus that error.
   VectorX predictor_error(const LocalError& error, const History& history) const;
   /// Makes errors of past states, which are linear in each other as these are, those after a step with an error of its own:
   /// `of_x` are those of the new positions.
