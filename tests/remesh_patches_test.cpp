@@ -369,14 +369,14 @@ TEST_P(CyclesOfPatches, NothingDriftsOverAHundredCycles) {
     EXPECT_GT(remesh_once(options, scene).collapses.accepted, 0);
     coarse.push_back(scene.mesh.num_vertices());
   }
-  const auto mean = [](const auto& values, int first) {
-    return std::accumulate(values.begin() + first, values.begin() + first + 20, 0.0) / 20;
+  const auto mean = [](const auto& values, int first, int count = 20) {
+    return std::accumulate(values.begin() + first, values.begin() + first + count, 0.0) / count;
   };
   EXPECT_NEAR(mean(fine, 80), mean(fine, 5), 0.15 * mean(fine, 5));
   EXPECT_NEAR(mean(coarse, 80), mean(coarse, 5), 0.15 * mean(coarse, 5));
-  // A random mesh gets better in cycles that are not in the plane, or that inertia damps.
+  // A random mesh gets better in cycles that are not in the plane. With inertia, energies scatter by a third.
   if (turned || has_inertia)
-    EXPECT_LT(mean(energies, 80), 1.1 * mean(energies, 5));
+    EXPECT_LT(mean(energies, 55, 45), 1.1 * mean(energies, 5, 45));
   else
     EXPECT_NEAR(mean(energies, 80), mean(energies, 5), 0.1 * mean(energies, 5));
 }
