@@ -134,8 +134,15 @@ TEST(Accuracy, RunWithoutBarsOrWithStepsOfTheSceneSaysSo) {
   without.errors = {};
   run.add(without, 1);
   EXPECT_NE(run.describe("", "").find("no bar in any step: /output/error_bars is false"), std::string::npos);
+  const auto says_so = [&] {
+    return run.describe("", "").find("without the error of the steps, as the scene sets /time/dt") != std::string::npos;
+  };
   run.add(step(0.001), 1);
-  EXPECT_NE(run.describe("", "").find("without the error of the steps, as the scene sets /time/dt"), std::string::npos);
+  EXPECT_FALSE(says_so()) << "the bars know it: 0";
+  StepReport unknown = step(0.002);
+  unknown.errors.energy[static_cast<std::size_t>(ErrorSource::time)] = std::nan("");
+  run.add(unknown, 1);
+  EXPECT_TRUE(says_so());
 }
 
 TEST(Accuracy, EasyStepsDoNotPutOffAFinerMesh) {

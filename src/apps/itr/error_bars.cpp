@@ -55,19 +55,18 @@ std::map<std::string, Peak> find_peaks(const std::string& rows, const std::strin
     if (!(size > peak.size)) continue;
     peak = {cells[0], size, {}};
     for (int s = 0; s < kErrorSources; ++s)
-      for (const auto& [name, value] : force)
-        peak.errors[s] +=
-            size == 0
-                ? 0
-                : value / size *
-                      number(cells.at(columns.at(fmt::format("{}_error_{}", name, itr::name(static_cast<ErrorSource>(s))))));
+      for (const auto& [name, value] : force) {
+        const auto column = columns.find(fmt::format("{}_error_{}", name, itr::name(static_cast<ErrorSource>(s))));
+        const double error = column == columns.end() ? std::nan("") : number(cells.at(column->second));
+        peak.errors[s] += size == 0 ? 0 : value / size * error;
+      }
   }
   return peaks;
 }
 
 /// "1.6 % (mesh 0.9, dhat 0.4): refine the mesh first", of a value of this size.
 std::string describe(double size, BySource errors) {
-  const std::string unknown = std::isfinite(errors[kTime]) ? "" : "; the error of the time steps is not known";
+  const std::string unknown = std::isfinite(errors[kTime]) ? "" : "; that of the time steps is not known";
   constexpr double kWorthNaming = 0.05;  // of the sum
   double sum = 0;
   for (double& error : errors) {
@@ -81,8 +80,8 @@ std::string describe(double size, BySource errors) {
                            100 * std::abs(errors[s]) / size);
   const auto largest =
       std::max_element(errors.begin(), errors.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
-  return fmt::format("{:.2g} % ({}): {}{}", 100 * sum / size, parts,
-                     advice_of(static_cast<ErrorSource>(largest - errors.begin())), unknown);
+  return fmt::format("{:.2g} % ({}{}): {}", 100 * sum / size, parts, unknown,
+                     advice_of(static_cast<ErrorSource>(largest - errors.begin())));
 }
 
 /// Whether there is a bar: that of time may be missing where others are there.
